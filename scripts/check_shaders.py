@@ -1,0 +1,77 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compiles every shader entry point with glslangValidator, as OpenGL GLSL.
+
+Includes are resolved as csrc/gl/program.c does: `#include "x"` names a file below shaders/, read
+once, and #line carries the file's number, which is turned back into its name in the messages.
+
+    check_shaders.py [shaders/ [report.xml]]     report: JUnit, one case a shader
+"""
+
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+STAGES = ("comp", "vert", "frag", "geom")
+INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"')
+
+
+def flatten(path, root, files):
+    """The text of a shader with its includes in place; files collects what #line numbers."""
+    files.append(path)
+    number = len(files) - 1
+    out = []
+    for index, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        include = INCLUDE.match(line)
+        if include is None:
+            out.append(line)
+            if line.startswith("#version"):
+                out.append(f"#line {index + 1} {number}")
+            continue
+        included = root / include[1]
+        if included not in files:
+            out += ["#line 1 " + str(len(files)), *flatten(included, root, files)]
+        out.append(f"#line {index + 1} {number}")
+    return out
+
+
+def check(path, root):
+    """The compiler's complaint, empty where the shader is fine."""
+    files = []
+    try:
+        source = "\n".join(flatten(path, root, files)) + "\n"
+    except OSError as error:
+        return str(error)
+    stage = path.name.split(".")[-2]
+    run = subprocess.run(["glslangValidator", "--stdin", "-S", stage], input=source, text=True,
+                         capture_output=True, check=False)
+    if run.returncode == 0:
+        return ""
+    name = lambda match: f"{match[1]}{files[int(match[2])]}:" if int(match[2]) < len(files) \
+        else match[0]
+    return re.sub(r"^((?:ERROR|WARNING): )(\d+):", name, run.stdout + run.stderr, flags=re.M)
+
+
+def main():
+    root = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parent.parent / "shaders")
+    suite = ET.Element("testsuite", name="shaders")
+    failed = 0
+    shaders = sorted(p for p in root.rglob("*.glsl") if p.name.split(".")[-2] in STAGES)
+    for path in shaders:
+        case = ET.SubElement(suite, "testcase", classname="shaders",
+                             name=str(path.relative_to(root)))
+        complaint = check(path, root)
+        if complaint:
+            failed += 1
+            ET.SubElement(case, "failure", message="does not compile").text = complaint
+            print(f"{path}:\n{complaint}", file=sys.stderr)
+    print(f"{len(shaders) - failed} shaders compile, {failed} do not")
+    if len(sys.argv) > 2:
+        ET.ElementTree(suite).write(sys.argv[2], encoding="unicode")
+    return 1 if failed or not shaders else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The zip of scripts/package: what is in it, and that a Blender which has nothing else renders."""
+
+import os
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BUILD = Path(os.environ.get("BRUME_BUILD", ROOT / "build"))
+
+INSTALL_AND_RENDER = """
+import bpy, sys
+bpy.ops.preferences.addon_install(filepath={package!r})
+bpy.ops.preferences.addon_enable(module='brume')
+import brume
+print('add-on at', brume.__file__)
+scene = bpy.context.scene
+scene.render.engine = 'BRUME'
+scene.render.resolution_x, scene.render.resolution_y = 48, 32
+scene.render.resolution_percentage = 100
+scene.render.filepath = {picture!r}
+bpy.ops.render.render(write_still=True)
+"""
+
+
+@pytest.fixture(scope="session")
+def package(tmp_path_factory):
+    out = tmp_path_factory.mktemp("package")
+    done = subprocess.run([ROOT / "scripts" / "package", "--build", BUILD, "--out", out],
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return Path(done.stdout.strip())
+
+
+def test_contents(package):
+    names = zipfile.ZipFile(package).namelist()
+    assert {name.split("/")[0] for name in names} == {"brume"}  # one top folder, as Blender asks
+    for name in ("__init__.py", "blender_manifest.toml", "lib/libbrume.so", "LICENSE"):
+        assert f"brume/{name}" in names
+    assert any(name.endswith(".comp.glsl") for name in names)
+    assert not any("__pycache__" in name or name.endswith(".pyc") for name in names)
+
+
+def test_same_input_same_zip(package, tmp_path):
+    subprocess.run([ROOT / "scripts" / "package", "--build", BUILD, "--out", tmp_path],
+                   capture_output=True, check=True)
+    assert (tmp_path / package.name).read_bytes() == package.read_bytes()
+
+
+def test_installed_add_on_renders(package, tmp_path):
+    """Away from the checkout: library and shaders come out of the zip."""
+    environment = {name: value for name, value in os.environ.items()
+                   if not name.startswith("BRUME_")}
+    environment["BLENDER_USER_SCRIPTS"] = str(tmp_path / "scripts")
+    environment["BLENDER_USER_CONFIG"] = str(tmp_path / "config")
+    script = INSTALL_AND_RENDER.format(package=str(package), picture=str(tmp_path / "still.png"))
+    done = subprocess.run([os.environ.get("BLENDER", "blender"), "-b", "--factory-startup",
+                           "--python-exit-code", "1", "--python-expr", script], env=environment,
+                          stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300,
+                          check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert str(tmp_path / "scripts" / "addons" / "brume") in done.stdout
+    assert (tmp_path / "still.png").stat().st_size > 0

@@ -49,9 +49,10 @@ def check(path, root):
                          capture_output=True, check=False)
     if run.returncode == 0:
         return ""
-    name = lambda match: f"{match[1]}{files[int(match[2])]}:" if int(match[2]) < len(files) \
-        else match[0]
-    return re.sub(r"^((?:ERROR|WARNING): )(\d+):", name, run.stdout + run.stderr, flags=re.M)
+    names = dict(enumerate(map(str, files)))
+    return re.sub(r"^((?:ERROR|WARNING): )(\d+):",
+                  lambda match: f"{match[1]}{names.get(int(match[2]), match[2])}:",
+                  run.stdout + run.stderr, flags=re.M)
 
 
 def main():

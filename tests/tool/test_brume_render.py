@@ -180,7 +180,7 @@ def write_environment(path, color):
                   ("screenWindowWidth", "float", struct.pack("<f", 1.0)))
     head = struct.pack("<ii", openexr.MAGIC, 2)
     for name, kind, value in attributes:
-        head += name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+        head += f"{name}\0{kind}\0".encode() + struct.pack("<i", len(value)) + value
     head += b"\0"
     row = b"".join(np.full(width, value, "<f4").tobytes() for value in reversed(color))
     first = len(head) + 8 * height

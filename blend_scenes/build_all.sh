@@ -1,0 +1,10 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Builds every scene, or those named as arguments, with $BLENDER (default: blender). The plume's
+# simulation takes a minute; the others take seconds.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+[ $# -gt 0 ] || set -- plume cloud room cube lamps
+for name; do
+    "${BLENDER:-blender}" -b --factory-startup --python-exit-code 1 -P "$here/build_$name.py"
+done

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What differs between Blender's versions (3.4 to 5.2): the only place that knows."""
+
+import bpy
+import numpy as np
+
+
+def set_pass(render_pass, pixels):
+    """Writes a float32 pass; until 4.1 foreach_set wanted one row per pixel, since then it wants
+    a flat array."""
+    pixels = np.ascontiguousarray(pixels, np.float32)
+    if render_pass.channels > 1 and bpy.app.version < (4, 1, 0):
+        render_pass.rect.foreach_set(pixels.reshape(-1, render_pass.channels))
+    else:
+        render_pass.rect.foreach_set(pixels.reshape(-1))
+
+
+def identity(datablock):
+    """A string that names a datablock through its life: the session's number where there is one
+    (4.3), else name and library."""
+    original = datablock.original
+    uid = getattr(original, "session_uid", None)
+    if uid is not None:
+        return f"{original.bl_rna.identifier}:{uid}"
+    library = original.library.filepath if original.library else ""
+    return f"{original.bl_rna.identifier}:{original.name_full}:{library}"
+
+
+def node_tree(owner):
+    """The node tree that counts for a material, world or light, or None. From 5.0 on use_nodes
+    is always true and warns when read."""
+    if owner.node_tree is None:
+        return None
+    if bpy.app.version < (5, 0, 0) and not owner.use_nodes:
+        return None
+    return owner.node_tree
+
+
+def corner_normals(mesh):
+    """Normals of all corners, (loops, 3), that respect flat, smooth and custom normals."""
+    normals = np.empty(len(mesh.loops) * 3, np.float32)
+    if hasattr(mesh, "corner_normals"):
+        mesh.corner_normals.foreach_get("vector", normals)
+    else:
+        mesh.calc_normals_split()
+        mesh.loops.foreach_get("normal", normals)
+        mesh.free_normals_split()
+    return normals.reshape(-1, 3)
+
+
+def corner_uvs(layer, count):
+    """Coordinates of all corners of a UV layer, (loops, 2)."""
+    uvs = np.empty(count * 2, np.float32)
+    if bpy.app.version >= (3, 5, 0):
+        layer.uv.foreach_get("vector", uvs)
+    else:
+        layer.data.foreach_get("uv", uvs)
+    return uvs.reshape(-1, 2)
+
+
+def positions(mesh):
+    """Positions of all vertices, (vertices, 3)."""
+    values = np.empty(len(mesh.vertices) * 3, np.float32)
+    attribute = mesh.attributes.get("position")
+    if attribute is not None:
+        attribute.data.foreach_get("vector", values)
+    else:
+        mesh.vertices.foreach_get("co", values)
+    return values.reshape(-1, 3)
+
+
+def light_scale(light):
+    """What multiplies a lamp's energy beside its colour: exposure (4.5)."""
+    return 2.0 ** getattr(light, "exposure", 0.0)
+
+
+def light_temperature(light):
+    """The lamp's temperature in kelvin where it has one in use (4.5), else None."""
+    return light.temperature if getattr(light, "use_temperature", False) else None
+
+
+def light_casts_shadow(light):
+    """Cycles had a switch of its own until 4.2; a lamp casts none if either is off."""
+    return light.use_shadow and getattr(getattr(light, "cycles", None), "cast_shadow", True)
+
+
+def light_is_portal(light):
+    return bool(getattr(getattr(light, "cycles", None), "is_portal", False))
+
+
+def alpha_clips(material):
+    """EEVEE's alpha clip, which 4.2 took away."""
+    return bpy.app.version < (4, 2, 0) and material.blend_method == 'CLIP'
+
+
+def needs_node_categories():
+    """Before 4.0 the Add menu hid the common shader nodes from engines it did not know."""
+    return bpy.app.version < (4, 0, 0)

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The render engine: final renders, previews, passes; the viewport is in viewport.py."""
+
+import time
+import traceback
+
+import bpy
+
+from . import compat, native, session, viewport
+from .export import camera, scene
+from .properties import native_settings, passes_of
+
+POLL_MS = 30
+# A final render's status line changes at most this often, in seconds.
+STATUS_INTERVAL = 0.2
+
+
+class BrumeEngine(bpy.types.RenderEngine):
+    """Owns nothing native: Blender makes one per frame and throws it away."""
+
+    bl_idname = "BRUME"
+    bl_label = "Brume"
+    bl_use_preview = True
+    bl_use_postprocess = True
+    bl_use_shading_nodes_custom = False  # True, the default, hides Cycles' shader nodes
+    bl_use_eevee_viewport = True
+    bl_use_gpu_context = False           # True freezes Blender's windows during F12
+
+    # -- final render
+
+    def render(self, depsgraph):
+        # Blender dies when a render that writes a file ends without a completed result, so the
+        # result is begun first and always ended; cancel=True only when the user asked for it.
+        layer = depsgraph.view_layer_eval
+        result = self.begin_result(0, 0, self.resolution_x, self.resolution_y, layer=layer.name)
+        try:
+            self._render(depsgraph, result)
+        except native.BrumeError as error:
+            self._fail(f"{error.sentence} ({error.id})")
+        except Exception as error:
+            traceback.print_exc()
+            self._fail(f"Brume: {type(error).__name__}: {error}")
+        finally:
+            self.end_result(result, cancel=self.test_break())
+
+    def _fail(self, sentence):
+        self.report({'ERROR'}, sentence)
+        self.error_set(sentence)
+
+    def _render(self, depsgraph, result):
+        began = time.perf_counter()
+        stage = session.stage("preview" if self.is_preview else "final")
+        with stage.lock:
+            self.update_stats("", "Brume | Exporting")
+            scene.export(depsgraph, stage.target)
+            view, passes = self._view(depsgraph, result, stage.target)
+            self._report(stage.target.reports)
+            exported = time.perf_counter()
+            settings = native_settings(depsgraph.scene_eval.brume)
+            job = stage.scene.render(settings, view)
+            try:
+                if not self._wait(job, view.samples):
+                    return
+                self._report(job.warnings())
+                self._write(result, job, passes)
+                self._finish(depsgraph, job.stats(), exported - began,
+                             time.perf_counter() - began)
+            finally:
+                job.close()
+
+    def _view(self, depsgraph, result, target):
+        """brume_view of the scene's camera, and the passes to read."""
+        scene_eval = depsgraph.scene_eval
+        full = self.resolution_x, self.resolution_y
+        part = camera.border_pixels(scene_eval.render, *full)
+        buffer = result.resolution_x, result.resolution_y
+        if part[2:] != buffer:
+            part = (*part[:2], *buffer) if scene_eval.render.use_border else (0, 0, *buffer)
+        seen = camera.final(self, depsgraph, target, full, part)
+        passes = passes_of(depsgraph.view_layer_eval)
+        if self.is_preview:
+            passes = passes[:1]
+        settings = scene_eval.brume
+        view = native.View(
+            width=buffer[0], height=buffer[1], view_from_world=native.matrix(seen.view_from_world),
+            clip_from_view=native.matrix(seen.clip_from_view), clip_near=seen.clip_near,
+            clip_far=seen.clip_far, samples=4 if self.is_preview else settings.samples,
+            seed=settings.seed, filter_width=scene_eval.render.filter_size,
+            film_transparent=scene_eval.render.film_transparent,
+            passes=sum(1 << number for number, *_ in passes))
+        return view, passes
+
+    def _wait(self, job, samples):
+        """Follows the job to its end; False if the user broke it off."""
+        shown = 0.0
+        cancelled = False
+        while True:
+            status = job.wait(POLL_MS)
+            if status.ended:
+                break
+            if not cancelled and self.test_break():
+                job.cancel()
+                cancelled = True
+            self.update_progress(status.progress)
+            now = time.perf_counter()
+            if now - shown > STATUS_INTERVAL:
+                shown = now
+                name = native.library().stage_name(status.stage).decode()
+                self.update_stats("", f"Brume | {name} | Sample {status.samples_done}/{samples}")
+        job.check(status)
+        return status.state == native.JOB_DONE
+
+    def _write(self, result, job, passes):
+        layer = result.layers[0]
+        for number, name, channels, _ in passes:
+            target = layer.passes.find_by_name(name, "")
+            if target is None:
+                self.report({'WARNING'}, f"Blender has no pass {name} in this result")
+                continue
+            pixels = job.read(number)
+            compat.set_pass(target, pixels[..., :len(channels)])
+        self.update_progress(1.0)
+
+    def _report(self, entries):
+        for _, sentence in entries:
+            self.report({'WARNING'}, sentence)
+            if bpy.app.background and not self.is_preview:
+                print(f"Brume: warning: {sentence}", flush=True)
+
+    def _finish(self, depsgraph, stats, export_s, whole_s):
+        """The status line, and in background a printed one."""
+        if self.is_preview:
+            return
+        times = [f"{native.library().stage_name(index).decode()} {stats.stages[index].wall_ms:.0f}"
+                 for index in range(len(native.STAGES))]
+        line = (f"Brume | {whole_s:.2f} s | export {export_s * 1000:.0f}, {', '.join(times)} ms | "
+                f"peak {stats.peak_bytes / 2 ** 20:.0f} MiB")
+        self.update_stats("", line)
+        self.update_memory_stats(memory_used=stats.total_bytes / 2 ** 20,
+                                 memory_peak=stats.peak_bytes / 2 ** 20)
+        if bpy.app.background:
+            print(f"{line} | frame {depsgraph.scene_eval.frame_current}", flush=True)
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        for _, name, channels, kind in passes_of(renderlayer):
+            self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+
+    # -- viewport
+
+    def view_update(self, context, depsgraph):
+        viewport.of(self).update(self, context, depsgraph)
+
+    def view_draw(self, context, depsgraph):
+        viewport.of(self).draw(self, context, depsgraph)
+
+
+def register():
+    bpy.utils.register_class(BrumeEngine)
+
+
+def unregister():
+    bpy.utils.unregister_class(BrumeEngine)

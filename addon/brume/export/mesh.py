@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Evaluated meshes, and what turns into one, to the arrays of brume_mesh."""
+
+from contextlib import contextmanager
+
+import numpy as np
+
+from .. import compat
+
+SURFACE_TYPES = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META'}
+
+
+@contextmanager
+def mesh_of(ob):
+    """The object's evaluated mesh, for the time of the block; None if it has no faces."""
+    if ob.type == 'MESH':
+        yield ob.data
+        return
+    mesh = ob.to_mesh()
+    try:
+        yield mesh
+    finally:
+        ob.to_mesh_clear()
+
+
+def _get(collection, name, width, dtype):
+    values = np.empty(len(collection) * width, dtype)
+    collection.foreach_get(name, values)
+    return values.reshape(-1, width)
+
+
+def read(mesh):
+    """positions, triangles, corner_normals, corner_uvs (None without a UV layer) and
+    triangle_slots; None if there is nothing to draw."""
+    mesh.calc_loop_triangles()
+    if not mesh.loop_triangles:
+        return None
+    corners = _get(mesh.loop_triangles, "loops", 3, np.uint32)
+    layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    return {
+        "positions": compat.positions(mesh),
+        "triangles": _get(mesh.loop_triangles, "vertices", 3, np.uint32),
+        "corner_normals": compat.corner_normals(mesh)[corners],
+        "corner_uvs": compat.corner_uvs(layer, len(mesh.loops))[corners] if layer else None,
+        "triangle_slots": _get(mesh.loop_triangles, "material_index", 1,
+                               np.int32).astype(np.uint16).ravel(),
+    }
+
+
+def only_slots(arrays, slots):
+    """The arrays with the triangles of these slots alone; None if that leaves none."""
+    kept = np.isin(arrays["triangle_slots"], list(slots))
+    if not kept.any():
+        return None
+    if kept.all():
+        return arrays
+    per_triangle = ("triangles", "corner_normals", "corner_uvs", "triangle_slots")
+    return {name: values[kept] if name in per_triangle and values is not None else values
+            for name, values in arrays.items()}

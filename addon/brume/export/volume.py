@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Media: volume objects by file or from memory, and meshes filled with a volume shader."""
+
+import hashlib
+import os
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..native import BrumeError, Grid, vdb_list
+from . import material as materials
+from .volume_shader import compile_volume, default_program
+
+
+def density_scale(matrix):
+    """What Cycles multiplies the coefficients of a medium in object space by (object.cpp,
+    object_volume_density): a stretched volume keeps its optical depth."""
+    return 1.0 / np.linalg.norm(np.asarray(matrix)[:3, :3] @ np.full(3, 3 ** -0.5))
+
+
+def program_for(target, programs, material, available):
+    """The compiled program of a material for a medium with these grids; None if the material has
+    no volume shader. programs: those of this export."""
+    available = frozenset(available)
+    key = (material.as_pointer() if material else 0, available)
+    if key not in programs:
+        programs[key] = _compile(target, material, available)
+    return programs[key]
+
+
+def _compile(target, material, available):
+    if material is None:
+        return default_program(available)
+    tree = materials.volume_tree(material)
+    owner = f'Material "{material.name}"'
+    return tree and compile_volume(
+        tree, available, lambda sentence: target.reports.unsupported(owner, sentence))
+
+
+# ------------------------------------------------------------------------------------------------
+# Files
+
+
+@contextmanager
+def _scratch_file():
+    shared_memory = Path("/dev/shm")
+    folder = shared_memory if os.access(shared_memory, os.W_OK) else None
+    with tempfile.TemporaryDirectory(prefix="brume-", dir=folder) as path:
+        yield os.path.join(path, "volume.vdb")
+
+
+class _File:
+    """A .vdb on disk, or bytes that are one; gives the names of its grids and the grids."""
+
+    def __init__(self, path, stamp):
+        self.path, self.stamp = path, stamp
+        self.infos = {info.name.decode(): info for info in vdb_list(path)}
+
+    def grid(self, target, name):
+        return target.grid((*self.stamp, name), lambda: Grid.load_vdb(self.path, name))
+
+
+@contextmanager
+def _saved(volume):
+    """The file of a volume that has none of its own: packed bytes, or grids saved by Blender."""
+    with _scratch_file() as path:
+        if volume.packed_file:
+            Path(path).write_bytes(volume.packed_file.data)
+        elif not volume.grids.save(filepath=path):
+            raise BrumeError("VOLUME_SAVE", "its grids could not be saved by Blender.")
+        digest = hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest()
+        yield _File(path, ("memory", digest))
+
+
+@contextmanager
+def _on_disk(path):
+    try:
+        stamp = os.stat(path).st_mtime_ns
+    except OSError:
+        stamp = None  # the library says what is wrong with the path
+    yield _File(path, (path, stamp))
+
+
+def _file_of(ob):
+    """A context that gives the file of a volume object, or None where it has no grids at all."""
+    volume = ob.data
+    plain = ob.original.type == 'VOLUME' and not ob.original.modifiers
+    if plain and volume.filepath and not volume.packed_file:
+        volume.grids.load()
+        path = volume.grids.frame_filepath
+        # No path: the frame lies outside of a sequence that is cut off there.
+        return _on_disk(bpy.path.abspath(path, library=volume.library)) if path else None
+    if volume.packed_file or volume.grids.load() and len(volume.grids) or len(volume.grids):
+        return _saved(volume)
+    return None
+
+
+def export_volume_object(target, programs, ob, matrix, key, override=None):
+    """Puts one instance of a volume object; raises BrumeError."""
+    opened = _file_of(ob)
+    if opened is None:
+        return
+    material = override or next((slot.material for slot in ob.material_slots if slot.material),
+                                None)
+    with opened as file:
+        program = program_for(target, programs, material, file.infos)
+        if program is None:
+            target.reports.unsupported(f'Volume "{ob.name}"',
+                                       f'its material "{material.name}" has no volume shader.')
+            return
+        for name in program.unknown:
+            target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": no grid "{name}" in '
+                                                f"{file.path}; it reads as 0.")
+        if not program.grids:
+            target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": its material uses none of '
+                                                f"the grids in {file.path}; it is left out.")
+            return
+        grids = [file.grid(target, name) for name in program.grids]
+        scale = density_scale(matrix) if ob.data.render.space == 'OBJECT' else 1.0
+        target.put("volume", key, name=ob.name, program=program, grids=grids,
+                   world_from_object=matrix, scale=scale)
+
+
+def export_mesh_volume(target, programs, ob, arrays, material, matrix, key):
+    """Puts one instance of a closed mesh filled with its material's medium."""
+    program = program_for(target, programs, material, ())
+    for name in program.unknown:
+        target.reports.warn("GRID_UNKNOWN", f'"{ob.name}": a mesh has no grid "{name}"; it reads '
+                                            f"as 0.")
+    target.put("volume", key, name=ob.name, program=program, world_from_object=matrix,
+               positions=arrays["positions"], triangles=arrays["triangles"])

@@ -36,11 +36,13 @@ def read(mesh):
     if not mesh.loop_triangles:
         return None
     corners = _get(mesh.loop_triangles, "loops", 3, np.uint32)
+    # Before the UV layer is looked up: in 3.x this adds a layer, which moves the others.
+    normals = compat.corner_normals(mesh)
     layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     return {
         "positions": compat.positions(mesh),
         "triangles": _get(mesh.loop_triangles, "vertices", 3, np.uint32),
-        "corner_normals": compat.corner_normals(mesh)[corners],
+        "corner_normals": normals[corners],
         "corner_uvs": compat.corner_uvs(layer, len(mesh.loops))[corners] if layer else None,
         "triangle_slots": _get(mesh.loop_triangles, "material_index", 1,
                                np.int32).astype(np.uint16).ravel(),

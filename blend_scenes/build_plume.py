@@ -29,7 +29,7 @@ slate = staging.matt('Slate', (0.10, 0.14, 0.18))
 staging.add('Floor', bpy.ops.mesh.primitive_plane_add, floor, size=60.0)
 staging.add('Bowl', bpy.ops.mesh.primitive_cylinder_add, clay, smooth=True, vertices=96,
             radius=0.42, depth=0.30, location=(0.0, 0.0, 0.15))
-staging.sphere('Ball', 0.42, (1.55, -0.55, 0.42), chalk)
+staging.sphere('Ball', 0.42, (1.75, -0.75, 0.42), chalk)
 staging.box('Block', (0.6, 0.6, 1.1), (-1.75, 0.55, 0.55), slate, bevel=0.02, rotation=0.5)
 
 # The smoke: a disc above the bowl breathes it out, a breeze bends it, vorticity curls it.
@@ -81,7 +81,7 @@ staging.lamp('Sun', 'SUN', (-3.6, 2.0, 5.2), (0.0, 0.0, 0.0), 17.0, (1.0, 0.93, 
 staging.lamp('Area', 'AREA', (3.6, -3.2, 3.2), (0.0, 0.0, 1.4), 320.0, (0.80, 0.88, 1.0),
              shape='SQUARE', size=1.6)
 staging.world((0.30, 0.45, 0.80), 0.18)
-staging.camera((0.9, -9.4, 2.7), (0.2, 0.0, 1.28), lens=55.0)
+staging.camera((0.9, -9.4, 2.7), (0.25, 0.0, 1.30), lens=54.0)
 
 scene.frame_start, scene.frame_end = 1, FRAME
 shutil.rmtree(CACHE, ignore_errors=True)

@@ -54,6 +54,8 @@ def finish(name, samples=64, bounces=4):
     cycles.use_denoising = False
     cycles.max_bounces = bounces
     cycles.volume_bounces = 0
+    # A volume's hull is jagged: with the default of 8, rays that cross it often end in black.
+    cycles.transparent_max_bounces = 256
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     cycles.light_sampling_threshold = 0.0
     cycles.caustics_reflective = cycles.caustics_refractive = False

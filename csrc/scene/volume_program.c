@@ -118,7 +118,8 @@ static pthread_once_t blackbody_once = PTHREAD_ONCE_INIT;
 
 /* Planck's law against the matching functions, then to Rec.709 primaries with its D65 white. Cool
  * bodies lie outside the gamut; like Cycles we leave their negative green and blue alone. */
-static void blackbody_fill(void) {
+static void blackbody_fill(void)
+{
     static const double rgb_from_xyz[3][3] = {{3.2404542, -1.5371385, -0.4985314},
                                               {-0.9692660, 1.8760108, 0.0415560},
                                               {0.0556434, -0.2040259, 1.0572252}};
@@ -141,7 +142,8 @@ static void blackbody_fill(void) {
 }
 
 /* The table of count rgb entries at a position counted in entries; NaN reads the first. */
-static void table_lookup(const float *table, int count, float position, float out[3]) {
+static void table_lookup(const float *table, int count, float position, float out[3])
+{
     if (!(position > 0.0f))
         position = 0.0f;
     if (position > (float)(count - 1))
@@ -158,7 +160,8 @@ static void table_lookup(const float *table, int count, float position, float ou
 /* --- Check and copy ----------------------------------------------------------------------- */
 
 static brume_result check_register(uint32_t number, uint64_t written, const char *what,
-                                   const char *volume_name) {
+                                   const char *volume_name)
+{
     if (number >= BRUME_REGISTERS)
         return fail(BRUME_E_SHADER_PROGRAM,
                     "volume '%s': %s names register %u, but there are only %u", volume_name, what,
@@ -172,7 +175,8 @@ static brume_result check_register(uint32_t number, uint64_t written, const char
 
 static brume_result check_instruction(const brume_volume_program *program, uint32_t index,
                                       uint32_t grid_count, uint64_t *written,
-                                      const char *volume_name) {
+                                      const char *volume_name)
+{
     const brume_instruction *instruction = &program->instructions[index];
     if (instruction->op >= BRUME_OP_COUNT)
         return fail(BRUME_E_SHADER_PROGRAM, "volume '%s': instruction %u has the unknown op %u",
@@ -202,7 +206,8 @@ static brume_result check_instruction(const brume_volume_program *program, uint3
 }
 
 static brume_result check_program(const brume_volume_program *program, uint32_t grid_count,
-                                  const char *volume_name) {
+                                  const char *volume_name)
+{
     _Static_assert(BRUME_REGISTERS == 64u, "the written registers are bits of 64");
     if (program->instruction_count > MAX_INSTRUCTIONS)
         return fail(BRUME_E_SHADER_PROGRAM,
@@ -234,7 +239,8 @@ static brume_result check_program(const brume_volume_program *program, uint32_t 
 }
 
 brume_result volume_program_init(struct volume_program *program, const brume_volume_program *source,
-                                 uint32_t grid_count, const char *volume_name) {
+                                 uint32_t grid_count, const char *volume_name)
+{
     REQUIRE(program != NULL);
     REQUIRE(source != NULL);
     if (!volume_name)
@@ -261,7 +267,8 @@ brume_result volume_program_init(struct volume_program *program, const brume_vol
     return BRUME_OK;
 }
 
-void volume_program_finish(struct volume_program *program) {
+void volume_program_finish(struct volume_program *program)
+{
     free((void *)program->program.instructions);
     free((void *)program->program.ramps);
     *program = (struct volume_program){0};
@@ -271,46 +278,55 @@ void volume_program_finish(struct volume_program *program) {
 
 /* The safe arithmetic of Blender's Math node: where a result is undefined it is 0. */
 
-static inline float minimum(float a, float b) {
+static inline float minimum(float a, float b)
+{
     return a < b ? a : b;
 }
 
-static inline float maximum(float a, float b) {
+static inline float maximum(float a, float b)
+{
     return a > b ? a : b;
 }
 
-static inline float clamp01(float a) {
+static inline float clamp01(float a)
+{
     return a > 0.0f ? minimum(a, 1.0f) : 0.0f;
 }
 
-static inline float divide(float a, float b) {
+static inline float divide(float a, float b)
+{
     return b != 0.0f ? a / b : 0.0f;
 }
 
-static inline float power(float a, float b) {
+static inline float power(float a, float b)
+{
     if ((a < 0.0f && b != truncf(b)) || (a == 0.0f && b < 0.0f))
         return 0.0f;
     return powf(a, b);
 }
 
-static inline float logarithm(float a, float b) {
+static inline float logarithm(float a, float b)
+{
     return a > 0.0f && b > 0.0f ? divide(logf(a), logf(b)) : 0.0f;
 }
 
 /* Inigo Quilez's cubic polynomial, as Blender. */
-static inline float smooth_minimum(float a, float b, float distance) {
+static inline float smooth_minimum(float a, float b, float distance)
+{
     if (distance == 0.0f)
         return minimum(a, b);
     const float h = maximum(distance - fabsf(a - b), 0.0f) / distance;
     return minimum(a, b) - h * h * h * distance * (1.0f / 6.0f);
 }
 
-static inline float wrap(float a, float upper, float lower) {
+static inline float wrap(float a, float upper, float lower)
+{
     const float range = upper - lower;
     return range != 0.0f ? a - range * floorf((a - lower) / range) : lower;
 }
 
-static inline float pingpong(float a, float scale) {
+static inline float pingpong(float a, float scale)
+{
     if (scale == 0.0f)
         return 0.0f;
     const float turns = (a - scale) / (2.0f * scale);
@@ -319,12 +335,13 @@ static inline float pingpong(float a, float scale) {
 
 /* A register of a block is three runs of n floats, one per component. An op reads and writes the
  * same cell only, so its loops may be vectorised even where dst is an operand. */
-#define RUN(count, body)                                             \
-    do {                                                             \
-        _Pragma("omp simd") for (uint32_t i = 0; i < (count); ++i) { \
-            body;                                                    \
-        }                                                            \
-    } while (0);                                                     \
+#define RUN(count, body)                                           \
+    do {                                                           \
+        _Pragma("omp simd") for (uint32_t i = 0; i < (count); ++i) \
+        {                                                          \
+            body;                                                  \
+        }                                                          \
+    } while (0);                                                   \
     break
 #define ONE(expression) RUN(3 * n, const float x = a[i]; dst[i] = (expression))
 #define TWO(expression) \
@@ -338,7 +355,8 @@ static inline float pingpong(float a, float scale) {
 
 static void run_instruction(const brume_volume_program *program,
                             const brume_instruction *instruction, const float *const *grids,
-                            size_t first, uint32_t n, float (*registers)[3 * BLOCK]) {
+                            size_t first, uint32_t n, float (*registers)[3 * BLOCK])
+{
     float *dst = registers[instruction->dst];
     const uint32_t count = ops[instruction->op].registers;
     const float *a = count > 0 ? registers[instruction->a] : NULL;
@@ -481,16 +499,19 @@ static void run_instruction(const brume_volume_program *program,
 }
 
 /* Transport must never meet a negative, NaN or infinite coefficient. */
-static inline float sane(float value) {
+static inline float sane(float value)
+{
     return value > 0.0f && value < INFINITY ? value : 0.0f;
 }
 
-static inline float sane_g(float g) {
+static inline float sane_g(float g)
+{
     return g > -0.99f ? minimum(g, 0.99f) : g == g ? -0.99f : 0.0f;
 }
 
 void volume_program_run(const struct volume_program *program, const float *const *grids,
-                        uint32_t count, struct medium_sample *out) {
+                        uint32_t count, struct medium_sample *out)
+{
     const brume_volume_program *code = &program->program;
     float registers[BRUME_REGISTERS][3 * BLOCK];
     for (uint32_t first = 0; first < count; first += BLOCK) {

@@ -66,7 +66,8 @@ struct raster {
     float *coverage;
 };
 
-static struct edge edge_between(const double a[3], const double b[3]) {
+static struct edge edge_between(const double a[3], const double b[3])
+{
     const double dx = b[0] - a[0], dy = b[1] - a[1];
     const bool ordered = a[0] < b[0] || (a[0] == b[0] && a[1] < b[1]);
     const double *from = ordered ? a : b, *to = ordered ? b : a;
@@ -78,13 +79,15 @@ static struct edge edge_between(const double a[3], const double b[3]) {
                          .inclusive = dy > 0.0 || (dy == 0.0 && dx < 0.0)};
 }
 
-static inline bool edge_holds(const struct edge *edge, double x, double y) {
+static inline bool edge_holds(const struct edge *edge, double x, double y)
+{
     const double side = edge->sign * (edge->dx * (y - edge->y) - edge->dy * (x - edge->x));
     return side > 0.0 || (side == 0.0 && edge->inclusive);
 }
 
 /* false for a triangle that no column can cross. */
-static bool facet_make(const double *const v[3], struct facet *out) {
+static bool facet_make(const double *const v[3], struct facet *out)
+{
     const double area =
         (v[1][0] - v[0][0]) * (v[2][1] - v[0][1]) - (v[1][1] - v[0][1]) * (v[2][0] - v[0][0]);
     if (area == 0.0)
@@ -109,7 +112,8 @@ static bool facet_make(const double *const v[3], struct facet *out) {
     return true;
 }
 
-static bool crossings_push(struct crossings *list, struct crossing crossing) {
+static bool crossings_push(struct crossings *list, struct crossing crossing)
+{
     if (list->count == list->capacity) {
         const size_t capacity = list->capacity ? 2 * list->capacity : 4096;
         struct crossing *found = realloc(list->found, capacity * sizeof *found);
@@ -126,7 +130,8 @@ static bool crossings_push(struct crossings *list, struct crossing crossing) {
     return true;
 }
 
-static void crossings_finish(struct crossings *list) {
+static void crossings_finish(struct crossings *list)
+{
     free(list->found);
     free(list->sorted);
     free(list->starts);
@@ -134,7 +139,8 @@ static void crossings_finish(struct crossings *list) {
 
 /* Where the row of columns at y crosses the facet. false: no memory. */
 static bool facet_cross(const struct facet *facet, double y, const struct raster *raster,
-                        struct crossings *list) {
+                        struct crossings *list)
+{
     double x_min = INFINITY, x_max = -INFINITY;
     for (int i = 0; i < 3; ++i) {
         const struct edge *edge = &facet->edges[i];
@@ -168,7 +174,8 @@ static bool facet_cross(const struct facet *facet, double y, const struct raster
     return true;
 }
 
-static int by_height(const void *left, const void *right) {
+static int by_height(const void *left, const void *right)
+{
     const struct crossing *a = left, *b = right;
     if (a->z != b->z)
         return a->z < b->z ? -1 : 1;
@@ -176,7 +183,8 @@ static int by_height(const void *left, const void *right) {
 }
 
 /* Groups by column, counting; then each column from below. */
-static void crossings_sort(struct crossings *list, uint32_t column_count) {
+static void crossings_sort(struct crossings *list, uint32_t column_count)
+{
     memset(list->starts, 0, (column_count + 1) * sizeof *list->starts);
     for (size_t i = 0; i < list->count; ++i)
         ++list->starts[list->found[i].column];
@@ -194,7 +202,8 @@ static void crossings_sort(struct crossings *list, uint32_t column_count) {
     }
 }
 
-static void cover_interval(const struct raster *raster, double from, double to, float *cells) {
+static void cover_interval(const struct raster *raster, double from, double to, float *cells)
+{
     const int32_t *dims = raster->dims;
     const size_t stride = (size_t)dims[0] * (size_t)dims[1];
     const float share = 1.0f / (float)(raster->columns * raster->columns);
@@ -204,7 +213,8 @@ static void cover_interval(const struct raster *raster, double from, double to, 
         cells[(size_t)k * stride] += share * (float)(fmin(to, k + 1.0) - fmax(from, k));
 }
 
-static void cover_row(const struct raster *raster, const struct crossings *list, int32_t row) {
+static void cover_row(const struct raster *raster, const struct crossings *list, int32_t row)
+{
     float *cells = raster->coverage + (size_t)row * (size_t)raster->dims[0];
     for (uint32_t column = 0; column < raster->row_columns; ++column) {
         const struct crossing *sorted = list->sorted + list->starts[column];
@@ -221,7 +231,8 @@ static void cover_row(const struct raster *raster, const struct crossings *list,
     }
 }
 
-static void round_row(const struct raster *raster, int32_t row) {
+static void round_row(const struct raster *raster, int32_t row)
+{
     const size_t width = (size_t)raster->dims[0], height = (size_t)raster->dims[1];
     for (int32_t k = 0; k < raster->dims[2]; ++k) {
         float *cells = raster->coverage + ((size_t)k * height + (size_t)row) * width;
@@ -231,8 +242,8 @@ static void round_row(const struct raster *raster, int32_t row) {
 }
 
 /* The rows of cells whose columns a facet may cross; false if none. */
-static bool facet_rows(const struct facet *facet, int32_t row_count, int32_t *first,
-                       int32_t *last) {
+static bool facet_rows(const struct facet *facet, int32_t row_count, int32_t *first, int32_t *last)
+{
     if (!(facet->y_max >= 0.0 && facet->y_min <= row_count))
         return false;
     *first = (int32_t)fmax(floor(facet->y_min), 0.0);
@@ -242,7 +253,8 @@ static bool facet_rows(const struct facet *facet, int32_t row_count, int32_t *fi
 
 static bool cross_row(const struct raster *raster, const struct facet *facets,
                       const uint32_t *members, size_t member_count, int32_t row,
-                      struct crossings *list) {
+                      struct crossings *list)
+{
     for (int sub_row = 0; sub_row < raster->columns; ++sub_row) {
         const double y = row + (sub_row + 0.5) / raster->columns;
         list->count = 0;
@@ -261,7 +273,8 @@ static bool cross_row(const struct raster *raster, const struct facet *facets,
 }
 
 static brume_result check_mesh(const float *positions, uint32_t vertex_count,
-                               const uint32_t *triangles, uint32_t triangle_count) {
+                               const uint32_t *triangles, uint32_t triangle_count)
+{
     for (size_t i = 0; i < (size_t)vertex_count * 3; ++i)
         if (!isfinite(positions[i]))
             return fail(BRUME_E_MESH, "vertex %zu of the mesh has a NaN or infinite position",
@@ -275,7 +288,8 @@ static brume_result check_mesh(const float *positions, uint32_t vertex_count,
 
 /* Facets in lattice space; returns how many could be crossed at all. */
 static size_t make_facets(const double *vertices, const uint32_t *triangles,
-                          uint32_t triangle_count, struct facet *facets) {
+                          uint32_t triangle_count, struct facet *facets)
+{
     size_t count = 0;
     for (size_t i = 0; i < triangle_count; ++i) {
         const double *const corners[3] = {vertices + 3 * (size_t)triangles[3 * i],
@@ -288,7 +302,8 @@ static size_t make_facets(const double *vertices, const uint32_t *triangles,
 
 brume_result voxelize_mesh(const float *positions, uint32_t vertex_count, const uint32_t *triangles,
                            uint32_t triangle_count, const float lattice_from_object[16],
-                           const int32_t dims[3], float *coverage) {
+                           const int32_t dims[3], float *coverage)
+{
     REQUIRE(positions != NULL || vertex_count == 0);
     REQUIRE(triangles != NULL || triangle_count == 0);
     REQUIRE(coverage != NULL);

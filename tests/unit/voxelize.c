@@ -18,7 +18,8 @@
 static const uint32_t box_triangles[36] = {0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4,
                                            2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6};
 
-static void box_vertices(float x0, float y0, float z0, float x1, float y1, float z1, float *out) {
+static void box_vertices(float x0, float y0, float z0, float x1, float y1, float z1, float *out)
+{
     for (int i = 0; i < 8; ++i) {
         out[3 * i] = i & 1 ? x1 : x0;
         out[3 * i + 1] = i & 2 ? y1 : y0;
@@ -26,20 +27,23 @@ static void box_vertices(float x0, float y0, float z0, float x1, float y1, float
     }
 }
 
-static double sum(const float *values, size_t count) {
+static double sum(const float *values, size_t count)
+{
     double total = 0.0;
     for (size_t i = 0; i < count; ++i)
         total += values[i];
     return total;
 }
 
-static float overlap(float lower, float upper, int cell) {
+static float overlap(float lower, float upper, int cell)
+{
     return fmaxf(fminf(upper, (float)cell + 1.0f) - fmaxf(lower, (float)cell), 0.0f);
 }
 
 /* Voxelises an axis-aligned box and compares each cell with the product of its overlaps. */
 static void expect_box(const float lower[3], const float upper[3], const int32_t dims[3],
-                       const float lattice_from_object[16], float tolerance) {
+                       const float lattice_from_object[16], float tolerance)
+{
     float vertices[24], inverse[16], object_vertices[24];
     box_vertices(lower[0], lower[1], lower[2], upper[0], upper[1], upper[2], vertices);
     assert_true(mat4_invert(lattice_from_object, inverse));
@@ -66,7 +70,8 @@ static void expect_box(const float lower[3], const float upper[3], const int32_t
     free(coverage);
 }
 
-static void a_box_on_the_cells_fills_them_exactly(void **state) {
+static void a_box_on_the_cells_fills_them_exactly(void **state)
+{
     (void)state;
     float identity[16];
     mat4_identity(identity);
@@ -82,7 +87,8 @@ static void a_box_on_the_cells_fills_them_exactly(void **state) {
     expect_box((float[3]){3, 4, 0}, (float[3]){70, 60, 2}, (int32_t[3]){72, 64, 3}, scaled, 0.0f);
 }
 
-static void a_box_between_the_cells_has_exact_fractions(void **state) {
+static void a_box_between_the_cells_has_exact_fractions(void **state)
+{
     (void)state;
     float identity[16];
     mat4_identity(identity);
@@ -103,7 +109,8 @@ static void a_box_between_the_cells_has_exact_fractions(void **state) {
     assert_float_equal(sum(coverage, 7 * 6 * 5), 27.0, 1e-4);
 }
 
-static void what_stands_out_of_the_lattice_is_cut(void **state) {
+static void what_stands_out_of_the_lattice_is_cut(void **state)
+{
     (void)state;
     float identity[16];
     mat4_identity(identity);
@@ -116,7 +123,8 @@ static void what_stands_out_of_the_lattice_is_cut(void **state) {
 
 /* A sphere of latitudes and longitudes; its poles and meridians meet in many triangles. */
 static void sphere_make(float centre, float radius, int rings, float **positions,
-                        uint32_t *vertex_count, uint32_t **triangles, uint32_t *triangle_count) {
+                        uint32_t *vertex_count, uint32_t **triangles, uint32_t *triangle_count)
+{
     const int segments = 2 * rings;
     *vertex_count = (uint32_t)((rings + 1) * segments);
     *triangle_count = (uint32_t)(2 * rings * segments);
@@ -144,7 +152,8 @@ static void sphere_make(float centre, float radius, int rings, float **positions
         }
 }
 
-static void a_sphere_has_its_volume(void **state) {
+static void a_sphere_has_its_volume(void **state)
+{
     (void)state;
     float identity[16];
     mat4_identity(identity);
@@ -172,7 +181,8 @@ static void a_sphere_has_its_volume(void **state) {
     }
 }
 
-static void a_turned_sheared_box_keeps_its_volume(void **state) {
+static void a_turned_sheared_box_keeps_its_volume(void **state)
+{
     (void)state;
     /* A unit cube to a parallelepiped inside the lattice; the volume is the determinant. */
     const float turn[16] = {6, 4, 1, 0, -4, 6, 2, 0, 1, -2, 7, 0, 7, 4, 3, 1};
@@ -196,7 +206,8 @@ static void a_turned_sheared_box_keeps_its_volume(void **state) {
 }
 
 static void join_boxes(const float first[24], const float second[24], float positions[48],
-                       uint32_t triangles[72]) {
+                       uint32_t triangles[72])
+{
     memcpy(positions, first, 24 * sizeof *positions);
     memcpy(positions + 24, second, 24 * sizeof *positions);
     for (int i = 0; i < 36; ++i) {
@@ -205,7 +216,8 @@ static void join_boxes(const float first[24], const float second[24], float posi
     }
 }
 
-static void overlapping_boxes_unite(void **state) {
+static void overlapping_boxes_unite(void **state)
+{
     (void)state;
     float identity[16], first[24], second[24], positions[48], coverage[512];
     uint32_t triangles[72];
@@ -230,7 +242,8 @@ static void overlapping_boxes_unite(void **state) {
     assert_float_equal(sum(coverage, 512), 80.0, 1e-4);
 }
 
-static void a_hole_costs_its_columns_and_nothing_smears(void **state) {
+static void a_hole_costs_its_columns_and_nothing_smears(void **state)
+{
     (void)state;
     float identity[16], vertices[24], coverage[512];
     const int32_t dims[3] = {8, 8, 8};
@@ -277,7 +290,8 @@ static void a_hole_costs_its_columns_and_nothing_smears(void **state) {
         }
 }
 
-static void degenerate_triangles_do_not_matter(void **state) {
+static void degenerate_triangles_do_not_matter(void **state)
+{
     (void)state;
     float identity[16], positions[30], coverage[512];
     uint32_t triangles[45];
@@ -297,7 +311,8 @@ static void degenerate_triangles_do_not_matter(void **state) {
     assert_true(sum(coverage, 512) == 0.0);
 }
 
-static void bad_meshes_are_refused(void **state) {
+static void bad_meshes_are_refused(void **state)
+{
     (void)state;
     float identity[16], vertices[24], coverage[512];
     uint32_t triangles[36];
@@ -321,7 +336,8 @@ static void bad_meshes_are_refused(void **state) {
                      BRUME_E_TRANSFORM);
 }
 
-static void any_number_of_threads_gives_the_same(void **state) {
+static void any_number_of_threads_gives_the_same(void **state)
+{
     (void)state;
     float identity[16], *positions;
     uint32_t vertex_count, *triangles, triangle_count;
@@ -344,7 +360,8 @@ static void any_number_of_threads_gives_the_same(void **state) {
     free(triangles);
 }
 
-int main(void) {
+int main(void)
+{
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_box_on_the_cells_fills_them_exactly),
         cmocka_unit_test(a_box_between_the_cells_has_exact_fractions),

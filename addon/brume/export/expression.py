@@ -11,6 +11,8 @@ import numpy as np
 
 from . import nodes
 
+# Nodes one behind the other; Python's own limit allows about 250.
+DEEPEST = 128
 REC709_LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
 
 
@@ -88,24 +90,19 @@ def _smootherstep(a, b=None, c=None):
     return t ** 3 * (t * (t * 6 - 15) + 10)
 
 
-def _gaussian(x, mean, below, above):
-    return np.exp(-0.5 * ((x - mean) * np.where(x < mean, below, above)) ** 2)
-
-
 def blackbody(kelvin):
-    """Linear Rec.709 of a black body, luminance 1. Planck's law over the CIE 1931 observer as
-    fitted by Wyman, Sloan and Shirley (JCGT 2013); held at 800 K and 12000 K as Cycles does."""
-    kelvin = float(np.clip(kelvin, 800.0, 12000.0))
-    nm = np.arange(380.0, 781.0, 2.0)
-    power = nm ** -5 / np.expm1(1.438776877e7 / (nm * kelvin))
-    x = (1.056 * _gaussian(nm, 599.8, 0.0264, 0.0323) + 0.362 * _gaussian(nm, 442.0, 0.0624, 0.0374)
-         - 0.065 * _gaussian(nm, 501.1, 0.0490, 0.0382))
-    y = 0.821 * _gaussian(nm, 568.8, 0.0213, 0.0247) + 0.286 * _gaussian(nm, 530.9, 0.0613, 0.0322)
-    z = 1.217 * _gaussian(nm, 437.0, 0.0845, 0.0278) + 0.681 * _gaussian(nm, 459.0, 0.0385, 0.0725)
-    xyz = np.array([np.sum(power * curve) for curve in (x, y, z)])
-    rgb = np.array(((3.2404542, -1.5371385, -0.4985314), (-0.9692660, 1.8760108, 0.0415560),
-                    (0.0556434, -0.2040259, 1.0572252))) @ (xyz / xyz[1])
-    return np.maximum(rgb, 0.0)
+    """Linear Rec.709 of a black body, luminance 1: the Planckian locus as fitted by Krystek
+    (Color Research and Application 10, 1985). Held at 800 K and 12000 K as in Cycles, and like
+    there without clipping: cool bodies lie outside of the gamut."""
+    t = float(np.clip(kelvin, 800.0, 12000.0))
+    u = (0.860117757 + 1.54118254e-4 * t + 1.28641212e-7 * t * t) / (
+        1 + 8.42420235e-4 * t + 7.08145163e-7 * t * t)
+    v = (0.317398726 + 4.22806245e-5 * t + 4.20481691e-8 * t * t) / (
+        1 - 2.89741816e-5 * t + 1.61456053e-7 * t * t)
+    # CIE 1960 uv to XYZ of Y = 1, then to Rec.709 primaries.
+    xyz = np.array((1.5 * u / v, 1.0, (4 - u - 10 * v) / (2 * v)))
+    return np.array(((3.2404542, -1.5371385, -0.4985314), (-0.9692660, 1.8760108, 0.0415560),
+                     (0.0556434, -0.2040259, 1.0572252))) @ xyz
 
 
 _ARITHMETIC = {
@@ -195,6 +192,7 @@ class Builder:
         self.ramps = []
         self._shared = {}
         self._outputs = {}
+        self._depth = 0
         self.handlers = dict(_HANDLERS)
 
     # -- expressions
@@ -249,12 +247,15 @@ class Builder:
         if source.node is None:
             return self._convert(self.stored(source.socket), source.socket.type,
                                  place.socket.type)
+        self._depth += 1
         try:
             return self._convert(self._output(source), source.output.type, place.socket.type)
         except Unsupported as problem:
             self.warn(f"{problem} is not supported; {place.socket.name} "
                       f"of {nodes.label(place.socket.node)} keeps its own value.")
             return self.stored(place.socket)
+        finally:
+            self._depth -= 1
 
     def number(self, place):
         """An input as three floats, or None if it is not constant."""
@@ -277,6 +278,8 @@ class Builder:
         key = (source.node.as_pointer(), source.output.identifier,
                tuple(group.as_pointer() for group in source.path))
         if key not in self._outputs:
+            if self._depth > DEEPEST:
+                raise Unsupported(f"a chain of more than {DEEPEST} nodes")
             handler = self.handlers.get(source.node.bl_idname)
             if handler is None:
                 raise Unsupported(nodes.label(source.node))
@@ -476,6 +479,11 @@ def _bright_contrast(builder, source):
     return builder.op("MAXIMUM", scaled, 0.0)
 
 
+def _blackbody(builder, source):
+    color = builder.op("BLACKBODY", *_inputs(builder, source, "Temperature"))
+    return builder.op("MAXIMUM", color, 0.0)
+
+
 _HANDLERS = {
     "ShaderNodeMath": _math,
     "ShaderNodeVectorMath": _vector_math,
@@ -493,8 +501,7 @@ _HANDLERS = {
     "ShaderNodeInvert": _invert,
     "ShaderNodeGamma": _gamma,
     "ShaderNodeBrightContrast": _bright_contrast,
-    "ShaderNodeBlackbody":
-        lambda builder, source: builder.op("BLACKBODY", *_inputs(builder, source, "Temperature")),
+    "ShaderNodeBlackbody": _blackbody,
     "ShaderNodeRGBToBW":
         lambda builder, source: builder.op("LUMINANCE", *_inputs(builder, source, "Color")),
     "ShaderNodeRGB": lambda builder, source: builder.stored(source.output),

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from ..native import Grid
-from .volume import density_scale, program_for
+from .volume import program_for
 
 # RNA property and components of each attribute that Cycles knows.
 _GRIDS = {"density": ("density_grid", 1), "flame": ("flame_grid", 1),
@@ -66,7 +66,8 @@ def _box(ob):
 
 
 def export(target, programs, ob, settings, material, matrix, key):
-    """Puts one instance of a domain, if its material has a volume shader."""
+    """Puts one instance of a domain, if its material has a volume shader. Unlike a volume object's
+    its coefficients are per metre of the world, whatever the object's scale (as in Cycles)."""
     names = [name for name, (attribute, _) in _GRIDS.items() if len(getattr(settings, attribute))]
     if not names:
         return  # no cache at this frame: there is no smoke
@@ -91,4 +92,4 @@ def export(target, programs, ob, settings, material, matrix, key):
         make = partial(Grid.create, name, data, object_from_array)
         grids.append(target.grid(("fluid", name, digest.hexdigest()), make))
     target.put("volume", key, name=ob.name, program=program, grids=grids,
-               world_from_object=matrix, scale=density_scale(matrix))
+               world_from_object=matrix)

@@ -124,7 +124,8 @@ void mat4_perspective(float fov_y, float aspect, float near_, float far_, float 
 // Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017.
 void frame_around(const float n[3], float tangent[3], float bitangent[3])
 {
-    const float sign = std::copysign(1.0f, n[2]);
+    // Not copysign: -0 must go the way that the shaders take.
+    const float sign = n[2] >= 0.0f ? 1.0f : -1.0f;
     const float a = -1.0f / (sign + n[2]);
     const float b = n[0] * n[1] * a;
     tangent[0] = 1.0f + sign * n[0] * n[0] * a;

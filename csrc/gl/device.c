@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The device's thread and its queue. */
+#include "gl/device.h"
+#include "base/log.h"
+#include "base/result.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+static void *thread_main(void *argument)
+{
+    brume_device *device = argument;
+    const brume_result started = context_init(&device->gpu.context, device->debug);
+
+    pthread_mutex_lock(&device->mutex);
+    device->start_result = started;
+    snprintf(device->start_error, sizeof device->start_error, "%s", last_error());
+    device->ready = 1;
+    pthread_cond_broadcast(&device->idle);
+    if (started != BRUME_OK) {
+        pthread_mutex_unlock(&device->mutex);
+        return NULL;
+    }
+    for (;;) {
+        while (!device->first && !device->quit)
+            pthread_cond_wait(&device->wake, &device->mutex);
+        struct task *task = device->first;
+        if (!task)
+            break;
+        device->first = task->next;
+        if (!device->first)
+            device->last = NULL;
+        device->busy = 1;
+        pthread_mutex_unlock(&device->mutex);
+        task->run(&device->gpu, task->user);
+        free(task);
+        pthread_mutex_lock(&device->mutex);
+        device->busy = 0;
+        pthread_cond_broadcast(&device->idle);
+    }
+    pthread_mutex_unlock(&device->mutex);
+
+    program_cache_finish(&device->gpu.programs);
+    if (device->gpu.memory.total != 0)
+        log_write(BRUME_LOG_WARNING, "%llu bytes of GPU memory were not freed",
+                  (unsigned long long)device->gpu.memory.total);
+    context_finish(&device->gpu.context);
+    return NULL;
+}
+
+brume_result device_create(const brume_device_params *params, brume_device **out)
+{
+    brume_device *device = calloc(1, sizeof *device);
+    if (!device)
+        return fail(BRUME_E_MEMORY, "no memory for the device");
+    log_set_sink(params->log, params->log_user);
+    device->debug = params->debug;
+    brume_result result = program_cache_init(&device->gpu.programs, params->shader_dir);
+    if (result != BRUME_OK) {
+        free(device);
+        return result;
+    }
+    pthread_mutex_init(&device->mutex, NULL);
+    pthread_cond_init(&device->wake, NULL);
+    pthread_cond_init(&device->idle, NULL);
+    if (pthread_create(&device->thread, NULL, thread_main, device) != 0) {
+        result = fail(BRUME_E_MEMORY, "the device's thread could not be started");
+        goto error;
+    }
+    pthread_mutex_lock(&device->mutex);
+    while (!device->ready)
+        pthread_cond_wait(&device->idle, &device->mutex);
+    pthread_mutex_unlock(&device->mutex);
+    if (device->start_result != BRUME_OK) {
+        pthread_join(device->thread, NULL);
+        result = fail(device->start_result, "%s", device->start_error);
+        goto error;
+    }
+    *out = device;
+    return BRUME_OK;
+
+error:
+    pthread_cond_destroy(&device->idle);
+    pthread_cond_destroy(&device->wake);
+    pthread_mutex_destroy(&device->mutex);
+    free(device);
+    return result;
+}
+
+void device_destroy(brume_device *device)
+{
+    pthread_mutex_lock(&device->mutex);
+    device->quit = 1;
+    pthread_cond_broadcast(&device->wake);
+    pthread_mutex_unlock(&device->mutex);
+    pthread_join(device->thread, NULL);
+    pthread_cond_destroy(&device->idle);
+    pthread_cond_destroy(&device->wake);
+    pthread_mutex_destroy(&device->mutex);
+    log_set_sink(NULL, NULL);
+    free(device);
+}
+
+brume_result device_post(brume_device *device, void (*run)(struct gpu *, void *), void *user)
+{
+    struct task *task = calloc(1, sizeof *task);
+    if (!task)
+        return fail(BRUME_E_MEMORY, "no memory to queue work for the device");
+    task->run = run;
+    task->user = user;
+    pthread_mutex_lock(&device->mutex);
+    if (device->last)
+        device->last->next = task;
+    else
+        device->first = task;
+    device->last = task;
+    pthread_cond_broadcast(&device->wake);
+    pthread_mutex_unlock(&device->mutex);
+    return BRUME_OK;
+}
+
+void device_drain(brume_device *device)
+{
+    pthread_mutex_lock(&device->mutex);
+    while (device->first || device->busy)
+        pthread_cond_wait(&device->idle, &device->mutex);
+    pthread_mutex_unlock(&device->mutex);
+}

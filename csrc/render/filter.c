@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Importance sampling of the pixel filter. */
+#include "render/filter.h"
+
+#include <math.h>
+
+#define PI 3.14159265358979323846
+
+/* Integral from -1/2 to x of the four-term Blackman-Harris window (Harris 1978, table 1),
+ * normalised to 1. */
+static double cumulated(double x)
+{
+    static const double a[] = {0.35875, 0.48829, 0.14128, 0.01168};
+    double sum = a[0] * (x + 0.5);
+    for (int k = 1; k < 4; ++k)
+        sum += a[k] * sin(2.0 * PI * k * x) / (2.0 * PI * k);
+    return sum / a[0];
+}
+
+static double invert(double share)
+{
+    double low = -0.5, high = 0.5;
+    for (int i = 0; i < 32; ++i) {
+        const double middle = 0.5 * (low + high);
+        if (cumulated(middle) < share)
+            low = middle;
+        else
+            high = middle;
+    }
+    return 0.5 * (low + high);
+}
+
+void filter_offset(uint32_t index, float width, float offset[2])
+{
+    /* Roberts' R2 sequence, from the plastic number; it starts at the centre. */
+    const double shares[2] = {fmod(0.5 + index * 0.7548776662466927, 1.0),
+                              fmod(0.5 + index * 0.5698402909980532, 1.0)};
+    for (int i = 0; i < 2; ++i)
+        offset[i] = (float)invert(shares[i]) * width;
+}

@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The pixel filter: where in and around its pixel a sample lies. Any thread. */
+#ifndef BRUME_RENDER_FILTER_H
+#define BRUME_RENDER_FILTER_H
+
+#include <stdint.h>
+
+/* Offset from the pixel's centre, in pixels, of sample number index. Sample 0 is the centre. The
+ * offsets are distributed as the Blackman-Harris filter of that width, so all weights are 1. */
+void filter_offset(uint32_t index, float width, float offset[2]);
+
+#endif

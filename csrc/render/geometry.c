@@ -1,0 +1,393 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Surfaces on the GPU. */
+#include "render/geometry.h"
+#include "base/result.h"
+#include "math/frame.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* --- Caches ------------------------------------------------------------------------------- */
+
+static brume_result upload_mesh(struct gpu *gpu, struct gpu_mesh *mesh, const struct entry *entry)
+{
+    const struct mesh_block *source = (const struct mesh_block *)entry->block;
+    mesh->key = entry->key;
+    mesh->revision = entry->revision;
+    return buffer_init(&gpu->memory, &mesh->corners, FOR_MESH,
+                       (uint64_t)source->triangle_count * 24 * sizeof(float), source->corners,
+                       source->name);
+}
+
+static int mip_levels(int width, int height)
+{
+    int levels = 1;
+    for (int side = width > height ? width : height; side > 1; side /= 2)
+        ++levels;
+    return levels;
+}
+
+static brume_result upload_image(struct gpu *gpu, struct gpu_image *image,
+                                 const struct entry *entry)
+{
+    static const GLint wraps[] = {
+        [BRUME_EXTEND_REPEAT] = GL_REPEAT,
+        [BRUME_EXTEND_CLAMP] = GL_CLAMP_TO_EDGE,
+        [BRUME_EXTEND_CLIP] = GL_CLAMP_TO_EDGE, /* the shader cuts */
+        [BRUME_EXTEND_MIRROR] = GL_MIRRORED_REPEAT,
+    };
+    const struct image_block *source = (const struct image_block *)entry->block;
+    image->key = entry->key;
+    image->revision = entry->revision;
+    image->extend = source->extend;
+    GLint limit = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &limit);
+    if (source->width > limit || source->height > limit)
+        return fail(BRUME_E_MEMORY, "image '%s' of %d x %d pixels is larger than the driver's %d",
+                    source->name, source->width, source->height, limit);
+    TRY(texture_init(&gpu->memory, &image->texture, FOR_IMAGE, GL_TEXTURE_2D, GL_RGBA16F,
+                     source->width, source->height, 1, mip_levels(source->width, source->height),
+                     source->name));
+    const GLuint id = image->texture.id;
+    glTextureSubImage2D(id, 0, 0, 0, source->width, source->height, GL_RGBA, GL_FLOAT,
+                        source->pixels);
+    glGenerateTextureMipmap(id);
+    glTextureParameteri(id, GL_TEXTURE_WRAP_S, wraps[source->extend]);
+    glTextureParameteri(id, GL_TEXTURE_WRAP_T, wraps[source->extend]);
+    if (source->nearest) {
+        glTextureParameteri(id, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+        glTextureParameteri(id, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    }
+    return BRUME_OK;
+}
+
+/* Both lists are sorted by key: what stands in both at one revision is kept. */
+static brume_result sync_meshes(struct gpu *gpu, struct geometry *geometry,
+                                const struct table *table)
+{
+    struct gpu_mesh *fresh = calloc((size_t)table->count + 1, sizeof *fresh);
+    if (!fresh)
+        return fail(BRUME_E_MEMORY, "no memory for %u meshes", table->count);
+    brume_result result = BRUME_OK;
+    uint32_t old = 0, count = 0;
+    for (uint32_t i = 0; i < table->count && result == BRUME_OK; ++i) {
+        const struct entry *entry = &table->entries[i];
+        while (old < geometry->mesh_count && geometry->meshes[old].key < entry->key)
+            buffer_finish(&gpu->memory, &geometry->meshes[old++].corners);
+        if (old < geometry->mesh_count && geometry->meshes[old].key == entry->key) {
+            struct gpu_mesh *kept = &geometry->meshes[old++];
+            if (kept->revision == entry->revision) {
+                fresh[count++] = *kept;
+                continue;
+            }
+            buffer_finish(&gpu->memory, &kept->corners);
+        }
+        result = upload_mesh(gpu, &fresh[count++], entry);
+    }
+    while (old < geometry->mesh_count)
+        buffer_finish(&gpu->memory, &geometry->meshes[old++].corners);
+    free(geometry->meshes);
+    geometry->meshes = fresh;
+    geometry->mesh_count = count;
+    return result;
+}
+
+static brume_result sync_images(struct gpu *gpu, struct geometry *geometry,
+                                const struct table *table, struct job_control *control)
+{
+    struct gpu_image *fresh = calloc((size_t)table->count + 1, sizeof *fresh);
+    if (!fresh)
+        return fail(BRUME_E_MEMORY, "no memory for %u images", table->count);
+    uint32_t old = 0, count = 0;
+    for (uint32_t i = 0; i < table->count; ++i) {
+        const struct entry *entry = &table->entries[i];
+        while (old < geometry->image_count && geometry->images[old].key < entry->key)
+            texture_finish(&gpu->memory, &geometry->images[old++].texture);
+        if (old < geometry->image_count && geometry->images[old].key == entry->key) {
+            struct gpu_image *kept = &geometry->images[old++];
+            if (kept->revision == entry->revision) {
+                fresh[count++] = *kept;
+                continue;
+            }
+            texture_finish(&gpu->memory, &kept->texture);
+        }
+        if (upload_image(gpu, &fresh[count], entry) == BRUME_OK)
+            ++count;
+        else
+            job_warn(control, "IMAGE_LEFT_OUT", "%s", last_error());
+    }
+    while (old < geometry->image_count)
+        texture_finish(&gpu->memory, &geometry->images[old++].texture);
+    free(geometry->images);
+    geometry->images = fresh;
+    geometry->image_count = count;
+    return BRUME_OK;
+}
+
+const struct gpu_image *geometry_image(const struct geometry *geometry, uint64_t key)
+{
+    if (key)
+        for (uint32_t i = 0; i < geometry->image_count; ++i)
+            if (geometry->images[i].key == key)
+                return &geometry->images[i];
+    return NULL;
+}
+
+static const struct gpu_mesh *find_mesh(const struct geometry *geometry, uint64_t key)
+{
+    uint32_t low = 0, high = geometry->mesh_count;
+    while (low < high) {
+        const uint32_t middle = low + (high - low) / 2;
+        if (geometry->meshes[middle].key < key)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < geometry->mesh_count && geometry->meshes[low].key == key ? &geometry->meshes[low]
+                                                                          : NULL;
+}
+
+/* --- Materials ---------------------------------------------------------------------------- */
+
+static vec4 pack(const float rgb[3], float w)
+{
+    return (vec4){rgb[0], rgb[1], rgb[2], w};
+}
+
+static struct gpu_material material_to_gpu(const struct geometry *geometry, const brume_material *m)
+{
+    struct gpu_material out = {
+        .diffuse = pack(m->diffuse, m->roughness),
+        .specular = pack(m->specular, m->alpha),
+        .metal = pack(m->metal, m->alpha_threshold > 0.0f ? m->alpha_threshold : 0.5f),
+        .emission = pack(m->emission, 0.0f),
+        .transparent = pack(m->transparent, 0.0f),
+    };
+    const struct gpu_image *base = geometry_image(geometry, m->base_image);
+    if (base)
+        out.flags.x |= MATERIAL_BASE_IMAGE |
+                       (base->extend == BRUME_EXTEND_CLIP ? MATERIAL_CLIP_IMAGE : 0u) |
+                       (m->alpha_from_base_image ? MATERIAL_ALPHA_IMAGE : 0u);
+    if (geometry_image(geometry, m->roughness_image))
+        out.flags.x |= MATERIAL_ROUGHNESS_IMAGE;
+    if (m->alpha_mode == BRUME_ALPHA_CLIP)
+        out.flags.x |= MATERIAL_ALPHA_CLIP;
+    if (m->alpha_mode == BRUME_ALPHA_BLEND && (m->alpha < 1.0f || m->alpha_from_base_image))
+        out.flags.x |= MATERIAL_ALPHA_BLEND;
+    if (m->backface_culling)
+        out.flags.x |= MATERIAL_CULL_BACK;
+    return out;
+}
+
+/* Number 0 is the grey of a slot without material; the others follow the table. */
+static brume_result sync_materials(struct gpu *gpu, struct geometry *geometry,
+                                   const struct table *table)
+{
+    static const brume_material grey = {.diffuse = {0.8f, 0.8f, 0.8f}, .roughness = 0.5f,
+                                        .alpha = 1.0f};
+    const size_t count = (size_t)table->count + 1;
+    struct gpu_material *materials = calloc(count, sizeof *materials);
+    if (!materials)
+        return fail(BRUME_E_MEMORY, "no memory for %u materials", table->count);
+    materials[0] = material_to_gpu(geometry, &grey);
+    for (uint32_t i = 0; i < table->count; ++i)
+        materials[i + 1] = material_to_gpu(
+            geometry, &((const struct material_block *)table->entries[i].block)->material);
+    const brume_result result =
+        buffer_update(&gpu->memory, &geometry->materials, FOR_MESH, count * sizeof *materials,
+                      materials, "materials");
+    free(materials);
+    return result;
+}
+
+/* --- Instances and draws ------------------------------------------------------------------ */
+
+static void grow(struct geometry *geometry, const float lower[3], const float upper[3])
+{
+    for (int i = 0; i < 3; ++i) {
+        geometry->lower[i] = fminf(geometry->lower[i], lower[i]);
+        geometry->upper[i] = fmaxf(geometry->upper[i], upper[i]);
+    }
+}
+
+static void write_instance(struct gpu_instance *out, const float *world_from_object,
+                           uint32_t visibility)
+{
+    float inverse[16];
+    memcpy(&out->world_from_object, world_from_object, sizeof out->world_from_object);
+    mat4_invert(world_from_object, inverse); /* singular ones were left out */
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 4; ++row)
+            out->normal_from_object.m[4 * column + row] =
+                column < 3 && row < 3 ? inverse[4 * row + column] : (column == row);
+    out->flags = (uvec4){visibility, 0, 0, 0};
+}
+
+static void add_draws(struct geometry *geometry, const struct snapshot *snapshot,
+                      const struct mesh_block *mesh, const struct gpu_mesh *gpu_mesh,
+                      const struct instances_block *set, uint32_t first_instance)
+{
+    const struct table *materials = &snapshot->tables[BRUME_KIND_MATERIAL];
+    for (uint32_t slot = 0; slot < mesh->slot_count; ++slot) {
+        const uint32_t first = mesh->slot_first[slot], end = mesh->slot_first[slot + 1];
+        if (first == end)
+            continue;
+        struct draw *draw = &geometry->draws[geometry->draw_count++];
+        *draw = (struct draw){.corners = gpu_mesh->corners.id,
+                              .first_corner = 3 * first,
+                              .corner_count = 3 * (end - first),
+                              .first_instance = first_instance,
+                              .instance_count = set->count,
+                              .visibility = set->visibility};
+        const struct entry *entry = table_find(materials, mesh->materials[slot]);
+        if (!entry)
+            continue;
+        const brume_material *material = &((struct material_block *)entry->block)->material;
+        const struct gpu_image *base = geometry_image(geometry, material->base_image);
+        const struct gpu_image *rough = geometry_image(geometry, material->roughness_image);
+        draw->material = (uint32_t)(entry - materials->entries) + 1;
+        draw->base_image = base ? base->texture.id : 0;
+        draw->roughness_image = rough ? rough->texture.id : 0;
+        draw->needs_fragments = material->alpha_mode != BRUME_ALPHA_OPAQUE;
+    }
+}
+
+static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
+                                   const struct snapshot *snapshot)
+{
+    const struct table *table = &snapshot->tables[BRUME_KIND_INSTANCES];
+    const struct table *meshes = &snapshot->tables[BRUME_KIND_MESH];
+    size_t instance_count = 0, draw_count = 0;
+    for (uint32_t i = 0; i < table->count; ++i) {
+        const struct instances_block *set = (struct instances_block *)table->entries[i].block;
+        const struct entry *mesh = table_find(meshes, set->mesh);
+        instance_count += set->count;
+        draw_count += mesh ? ((struct mesh_block *)mesh->block)->slot_count : 0;
+    }
+    struct gpu_instance *instances = calloc(instance_count + 1, sizeof *instances);
+    uint32_t *numbers = calloc(instance_count + 1, sizeof *numbers);
+    free(geometry->draws);
+    geometry->draws = calloc(draw_count + 1, sizeof *geometry->draws);
+    geometry->draw_count = 0;
+    geometry->triangle_count = 0;
+    for (int i = 0; i < 3; ++i) {
+        geometry->lower[i] = INFINITY;
+        geometry->upper[i] = -INFINITY;
+    }
+    brume_result result = BRUME_OK;
+    if (!instances || !numbers || !geometry->draws)
+        result = fail(BRUME_E_MEMORY, "no memory for %zu instances", instance_count);
+
+    uint32_t next = 0;
+    for (uint32_t i = 0; i < table->count && result == BRUME_OK; ++i) {
+        const struct instances_block *set = (struct instances_block *)table->entries[i].block;
+        const struct entry *entry = table_find(meshes, set->mesh);
+        const struct gpu_mesh *gpu_mesh = find_mesh(geometry, set->mesh);
+        if (!entry || !gpu_mesh || set->count == 0)
+            continue;
+        const struct mesh_block *mesh = (struct mesh_block *)entry->block;
+        if (mesh->triangle_count == 0)
+            continue;
+        add_draws(geometry, snapshot, mesh, gpu_mesh, set, next);
+        for (uint32_t k = 0; k < set->count; ++k) {
+            const float *matrix = set->world_from_object + 16 * (size_t)k;
+            float lower[3], upper[3];
+            mat4_bounds(matrix, mesh->lower, mesh->upper, lower, upper);
+            grow(geometry, lower, upper);
+            write_instance(&instances[next], matrix, set->visibility);
+            numbers[next] = next;
+            ++next;
+        }
+        geometry->triangle_count += mesh->triangle_count * set->count;
+    }
+    if (result == BRUME_OK)
+        result = buffer_update(&gpu->memory, &geometry->instances, FOR_MESH,
+                               (size_t)next * sizeof *instances, instances, "instances");
+    if (result == BRUME_OK)
+        result = buffer_update(&gpu->memory, &geometry->instance_numbers, FOR_MESH,
+                               (size_t)next * sizeof *numbers, numbers, "instance numbers");
+    free(instances);
+    free(numbers);
+    return result;
+}
+
+static void make_vertex_array(struct geometry *geometry)
+{
+    GLuint array;
+    glCreateVertexArrays(1, &array);
+    static const struct {
+        GLuint size, offset;
+    } attributes[] = {{3, 0}, {3, 12}, {2, 24}};
+    for (GLuint i = 0; i < 3; ++i) {
+        glEnableVertexArrayAttrib(array, i);
+        glVertexArrayAttribFormat(array, i, (GLint)attributes[i].size, GL_FLOAT, GL_FALSE,
+                                  attributes[i].offset);
+        glVertexArrayAttribBinding(array, i, 0);
+    }
+    glEnableVertexArrayAttrib(array, 3);
+    glVertexArrayAttribIFormat(array, 3, 1, GL_UNSIGNED_INT, 0);
+    glVertexArrayAttribBinding(array, 3, 1);
+    glVertexArrayBindingDivisor(array, 1, 1);
+    geometry->vertex_array = array;
+}
+
+brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,
+                           const struct snapshot *snapshot, struct job_control *control)
+{
+    if (!geometry->vertex_array)
+        make_vertex_array(geometry);
+    TRY(sync_meshes(gpu, geometry, &snapshot->tables[BRUME_KIND_MESH]));
+    TRY(sync_images(gpu, geometry, &snapshot->tables[BRUME_KIND_IMAGE], control));
+    TRY(sync_materials(gpu, geometry, &snapshot->tables[BRUME_KIND_MATERIAL]));
+    return sync_instances(gpu, geometry, snapshot);
+}
+
+brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const struct gpu_draw *stage,
+                           uint32_t visibility, int depth_only)
+{
+    const struct program *program;
+    TRY(program_draw(&gpu->programs, depth_only ? "shadow" : "gbuffer", &program));
+    TRY(buffer_update(&gpu->memory, &geometry->stage_block, FOR_TARGET, sizeof *stage, stage,
+                      "draw stage"));
+    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_STAGE, geometry->stage_block.id);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_INSTANCES, geometry->instances.id);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_MATERIALS, geometry->materials.id);
+    glUseProgram(program->id);
+    glBindVertexArray(geometry->vertex_array);
+    glVertexArrayVertexBuffer(geometry->vertex_array, 1, geometry->instance_numbers.id, 0, 4);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_GREATER); /* reversed depth */
+    for (uint32_t i = 0; i < geometry->draw_count; ++i) {
+        const struct draw *draw = &geometry->draws[i];
+        if ((draw->visibility & visibility) != visibility)
+            continue;
+        glVertexArrayVertexBuffer(geometry->vertex_array, 0, draw->corners, 0, 32);
+        glBindTextureUnit(SLOT_MATERIAL_BASE, draw->base_image);
+        glBindTextureUnit(SLOT_MATERIAL_ROUGHNESS, draw->roughness_image);
+        glVertexAttribI1ui(4, draw->material);
+        glDrawArraysInstancedBaseInstance(GL_TRIANGLES, (GLint)draw->first_corner,
+                                          (GLsizei)draw->corner_count,
+                                          (GLsizei)draw->instance_count, draw->first_instance);
+    }
+    glDisable(GL_DEPTH_TEST);
+    return BRUME_OK;
+}
+
+void geometry_finish(struct gpu *gpu, struct geometry *geometry)
+{
+    for (uint32_t i = 0; i < geometry->mesh_count; ++i)
+        buffer_finish(&gpu->memory, &geometry->meshes[i].corners);
+    for (uint32_t i = 0; i < geometry->image_count; ++i)
+        texture_finish(&gpu->memory, &geometry->images[i].texture);
+    buffer_finish(&gpu->memory, &geometry->instances);
+    buffer_finish(&gpu->memory, &geometry->instance_numbers);
+    buffer_finish(&gpu->memory, &geometry->materials);
+    buffer_finish(&gpu->memory, &geometry->stage_block);
+    if (geometry->vertex_array)
+        glDeleteVertexArrays(1, &geometry->vertex_array);
+    free(geometry->meshes);
+    free(geometry->images);
+    free(geometry->draws);
+    memset(geometry, 0, sizeof *geometry);
+}

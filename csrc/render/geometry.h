@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Meshes, instances, materials and images on the GPU, kept as long as the scene keeps them, and
+ * drawing them. Device thread. */
+#ifndef BRUME_RENDER_GEOMETRY_H
+#define BRUME_RENDER_GEOMETRY_H
+
+#include "base/job.h"
+#include "brume_gpu.h"
+#include "gl/device.h"
+#include "scene/scene.h"
+
+struct gpu_mesh {
+    uint64_t key, revision;
+    struct buffer corners;
+};
+
+struct gpu_image {
+    uint64_t key, revision;
+    struct texture texture;
+    uint32_t extend;
+};
+
+/* One draw: the triangles of one material slot, for all instances of a set. */
+struct draw {
+    GLuint corners, base_image, roughness_image;
+    uint32_t first_corner, corner_count;
+    uint32_t first_instance, instance_count;
+    uint32_t material;
+    uint32_t visibility;
+    int needs_fragments; /* alpha or culling decides per fragment */
+};
+
+struct geometry {
+    struct gpu_mesh *meshes;
+    uint32_t mesh_count;
+    struct gpu_image *images;
+    uint32_t image_count;
+    struct draw *draws;
+    uint32_t draw_count;
+    struct buffer instances, instance_numbers, materials, stage_block;
+    GLuint vertex_array;
+    uint32_t triangle_count;      /* instances counted */
+    float lower[3], upper[3];     /* of everything drawn; lower > upper when empty */
+};
+
+brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,
+                           const struct snapshot *snapshot, struct job_control *control);
+/* Draws what has all bits of `visibility` with the bound framebuffer. depth_only: without a
+ * fragment shader where a surface is whole. */
+brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const struct gpu_draw *stage,
+                           uint32_t visibility, int depth_only);
+const struct gpu_image *geometry_image(const struct geometry *geometry, uint64_t key);
+void geometry_finish(struct gpu *gpu, struct geometry *geometry);
+
+#endif

@@ -1,0 +1,277 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Jobs. */
+#include "render/job.h"
+#include "base/result.h"
+#include "gl/timer.h"
+#include "math/frame.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static void set_default(int32_t *value, int32_t fallback)
+{
+    if (*value == 0)
+        *value = fallback;
+}
+
+static brume_result check_settings(brume_settings *settings)
+{
+    set_default(&settings->medium_resolution, 128);
+    set_default(&settings->lattice_resolution, 64);
+    set_default(&settings->shadow_resolution, 512);
+    set_default(&settings->light_samples, 8);
+    set_default(&settings->world_samples, 32);
+    if (settings->step == 0.0f)
+        settings->step = 1.0f;
+    if (settings->memory_budget == 0)
+        settings->memory_budget = 2ull << 30;
+    REQUIRE(method_find(settings->method));
+    REQUIRE(settings->medium_resolution >= 1 && settings->medium_resolution <= 1024);
+    REQUIRE(settings->lattice_resolution >= 1 && settings->lattice_resolution <= 512);
+    REQUIRE(settings->shadow_resolution >= 16 && settings->shadow_resolution <= 8192);
+    REQUIRE(settings->light_samples >= 1 && settings->light_samples <= 1024);
+    REQUIRE(settings->world_samples >= 1 && settings->world_samples <= 1024);
+    REQUIRE(settings->step >= 0.05f && settings->step <= 100.0f);
+    REQUIRE(settings->memory_budget >= 1 << 20);
+    return BRUME_OK;
+}
+
+static brume_result check_view(brume_view *view)
+{
+    float inverse[16];
+    if (view->samples == 0)
+        view->samples = 16;
+    if (view->filter_width == 0.0f)
+        view->filter_width = 1.5f;
+    view->passes |= 1u << BRUME_PASS_COMBINED;
+    view->passes &= (1u << BRUME_PASS_COUNT) - 1u;
+    REQUIRE(view->width >= 1 && view->width <= 16384);
+    REQUIRE(view->height >= 1 && view->height <= 16384);
+    REQUIRE(view->samples <= 1u << 16);
+    REQUIRE(view->filter_width > 0.0f && view->filter_width <= 100.0f);
+    REQUIRE(isfinite(view->clip_near) && isfinite(view->clip_far));
+    REQUIRE(view->clip_near < view->clip_far);
+    if (!mat4_invert(view->view_from_world, inverse))
+        return fail(BRUME_E_TRANSFORM, "the camera's transform is singular or not finite");
+    if (!mat4_is_finite(view->clip_from_view) || view->clip_from_view[0] == 0.0f ||
+        view->clip_from_view[5] == 0.0f)
+        return fail(BRUME_E_TRANSFORM, "the camera's projection is singular or not finite");
+    if (view->clip_from_view[15] == 0.0f)
+        REQUIRE(view->clip_near > 0.0f);
+    return BRUME_OK;
+}
+
+static void unreference(brume_job *job)
+{
+    if (__atomic_sub_fetch(&job->references, 1, __ATOMIC_ACQ_REL) != 0)
+        return;
+    for (int pass = 0; pass < BRUME_PASS_COUNT; ++pass)
+        free(job->pixels[pass]);
+    pthread_cond_destroy(&job->ended);
+    job_control_finish(&job->control);
+    free(job);
+}
+
+static void end(brume_job *job, brume_result result)
+{
+    pthread_mutex_lock(&job->control.mutex);
+    job->result = result;
+    job->state = result == BRUME_OK          ? BRUME_JOB_DONE
+                 : result == BRUME_E_CANCELLED ? BRUME_JOB_CANCELLED
+                                               : BRUME_JOB_FAILED;
+    if (job->state == BRUME_JOB_FAILED)
+        snprintf(job->error, sizeof job->error, "%s", last_error());
+    if (result == BRUME_OK)
+        job->control.progress = 1.0f;
+    pthread_cond_broadcast(&job->ended);
+    pthread_mutex_unlock(&job->control.mutex);
+}
+
+static brume_result allocate_pixels(brume_job *job)
+{
+    for (uint32_t pass = 0; pass < BRUME_PASS_COUNT; ++pass) {
+        if (!(job->view.passes & (1u << pass)))
+            continue;
+        job->pixels[pass] = malloc((size_t)job->view.width * (size_t)job->view.height *
+                                   brume_pass_channels(pass) * sizeof(float));
+        if (!job->pixels[pass])
+            return fail(BRUME_E_MEMORY, "no memory for a picture of %d x %d", job->view.width,
+                        job->view.height);
+    }
+    return BRUME_OK;
+}
+
+/* On the device's thread. */
+static void run_job(struct gpu *gpu, void *user)
+{
+    brume_job *job = user;
+    struct snapshot snapshot = {0};
+    struct render_request request = {.snapshot = &snapshot,
+                                     .settings = job->settings,
+                                     .view = job->view,
+                                     .control = &job->control};
+    pthread_mutex_lock(&job->control.mutex);
+    job->state = BRUME_JOB_RUNNING;
+    pthread_mutex_unlock(&job->control.mutex);
+
+    brume_result result = BRUME_OK;
+    if (job_cancelled(&job->control))
+        result = fail(BRUME_E_CANCELLED, "cancelled");
+    if (result == BRUME_OK)
+        result = allocate_pixels(job);
+    if (result == BRUME_OK)
+        result = scene_snapshot(&job->scene->scene, &snapshot);
+    if (result == BRUME_OK) {
+        memcpy(request.pixels, job->pixels, sizeof request.pixels);
+        result = renderer_run(gpu, &job->scene->renderer, &request);
+        snapshot_finish(&snapshot);
+    }
+    job->stats = request.stats;
+    end(job, result);
+    unreference(job);
+}
+
+brume_result job_create(brume_scene *scene, const brume_settings *settings, const brume_view *view,
+                        brume_job **out)
+{
+    static const brume_settings default_settings;
+    brume_job *job = calloc(1, sizeof *job);
+    if (!job)
+        return fail(BRUME_E_MEMORY, "no memory for a job");
+    job->settings = settings ? *settings : default_settings;
+    job->view = *view;
+    brume_result result = check_settings(&job->settings);
+    if (result == BRUME_OK)
+        result = check_view(&job->view);
+    if (result != BRUME_OK) {
+        free(job);
+        return result;
+    }
+    job->references = 2;
+    job->scene = scene;
+    job_control_init(&job->control);
+    job->control.scene_closing = &scene->closing;
+    pthread_condattr_t attributes;
+    pthread_condattr_init(&attributes);
+    pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
+    pthread_cond_init(&job->ended, &attributes);
+    pthread_condattr_destroy(&attributes);
+    result = device_post(scene->device, run_job, job);
+    if (result != BRUME_OK) {
+        job->references = 1;
+        unreference(job);
+        return result;
+    }
+    *out = job;
+    return BRUME_OK;
+}
+
+static void copy_status(const brume_job *job, brume_job_status *out)
+{
+    *out = (brume_job_status){.state = job->state,
+                              .stage = job->control.stage,
+                              .progress = job->control.progress,
+                              .samples_done = job->control.samples_done,
+                              .result = (int32_t)job->result,
+                              .warnings = job->control.warning_count};
+}
+
+void job_poll(brume_job *job, brume_job_status *out)
+{
+    pthread_mutex_lock(&job->control.mutex);
+    copy_status(job, out);
+    pthread_mutex_unlock(&job->control.mutex);
+}
+
+void job_wait(brume_job *job, int32_t timeout_ms, brume_job_status *out)
+{
+    struct timespec until;
+    clock_gettime(CLOCK_MONOTONIC, &until);
+    if (timeout_ms > 0) {
+        until.tv_sec += timeout_ms / 1000;
+        until.tv_nsec += (long)(timeout_ms % 1000) * 1000000L;
+        if (until.tv_nsec >= 1000000000L) {
+            until.tv_nsec -= 1000000000L;
+            ++until.tv_sec;
+        }
+    }
+    pthread_mutex_lock(&job->control.mutex);
+    while (job->state < BRUME_JOB_DONE) {
+        if (timeout_ms < 0)
+            pthread_cond_wait(&job->ended, &job->control.mutex);
+        else if (pthread_cond_timedwait(&job->ended, &job->control.mutex, &until) == ETIMEDOUT)
+            break;
+    }
+    if (out)
+        copy_status(job, out);
+    pthread_mutex_unlock(&job->control.mutex);
+}
+
+static uint32_t state_of(brume_job *job)
+{
+    brume_job_status status;
+    job_poll(job, &status);
+    return status.state;
+}
+
+brume_result job_read(brume_job *job, uint32_t pass, float *pixels, uint64_t float_count)
+{
+    if (state_of(job) != BRUME_JOB_DONE)
+        return fail(BRUME_E_NOT_READY, "the job has no picture");
+    if (!job->pixels[pass])
+        return fail(BRUME_E_NOT_READY, "the job was not asked for the pass %s",
+                    brume_pass_name(pass));
+    const uint64_t expected = (uint64_t)job->view.width * (uint64_t)job->view.height *
+                              brume_pass_channels(pass);
+    REQUIRE(float_count == expected);
+    memcpy(pixels, job->pixels[pass], expected * sizeof *pixels);
+    return BRUME_OK;
+}
+
+brume_result job_stats(brume_job *job, brume_stats *out)
+{
+    if (state_of(job) < BRUME_JOB_DONE)
+        return fail(BRUME_E_NOT_READY, "the job has not ended");
+    *out = job->stats;
+    return BRUME_OK;
+}
+
+void job_release(brume_job *job)
+{
+    if (state_of(job) < BRUME_JOB_DONE)
+        job_cancel(&job->control);
+    unreference(job);
+}
+
+/* --- Scenes ------------------------------------------------------------------------------- */
+
+brume_result scene_open(brume_device *device, brume_scene **out)
+{
+    brume_scene *scene = calloc(1, sizeof *scene);
+    if (!scene)
+        return fail(BRUME_E_MEMORY, "no memory for a scene");
+    scene->device = device;
+    scene_init(&scene->scene);
+    *out = scene;
+    return BRUME_OK;
+}
+
+static void close_renderer(struct gpu *gpu, void *user)
+{
+    brume_scene *scene = user;
+    renderer_finish(gpu, &scene->renderer);
+}
+
+void scene_close(brume_scene *scene)
+{
+    __atomic_store_n(&scene->closing, 1, __ATOMIC_RELEASE);
+    if (device_post(scene->device, close_renderer, scene) != BRUME_OK)
+        return; /* no memory even for that: leak the scene rather than pull it from under a job */
+    device_drain(scene->device);
+    scene_finish(&scene->scene);
+    free(scene);
+}

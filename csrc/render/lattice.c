@@ -1,0 +1,193 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Laying out the lattices. */
+#include "render/lattice.h"
+#include "base/result.h"
+#include "math/frame.h"
+
+#include <math.h>
+#include <string.h>
+
+#define NODE_BYTES 8      /* optical depth of one light: four halves */
+#define SKY_NODE_BYTES 24 /* three times four halves */
+
+struct box {
+    float lower[3], upper[3];
+};
+
+static int box_is_empty(const struct box *box)
+{
+    return !(box->lower[0] <= box->upper[0]);
+}
+
+static void box_join(struct box *box, const float lower[3], const float upper[3])
+{
+    for (int i = 0; i < 3; ++i) {
+        box->lower[i] = fminf(box->lower[i], lower[i]);
+        box->upper[i] = fmaxf(box->upper[i], upper[i]);
+    }
+}
+
+static float longest(const struct box *box)
+{
+    float side = 0.0f;
+    for (int i = 0; i < 3; ++i)
+        side = fmaxf(side, box->upper[i] - box->lower[i]);
+    return side;
+}
+
+static vec4 pack(const float v[3], float w)
+{
+    return (vec4){v[0], v[1], v[2], w};
+}
+
+/* Nodes along the sides of a box for a number of cells along its longest. */
+static float nodes_of(const struct box *box, int resolution, ivec4 *dims)
+{
+    const float cell = fmaxf(longest(box), 1e-6f) / (float)resolution;
+    int *out = &dims->x;
+    for (int i = 0; i < 3; ++i) {
+        const int cells = (int)ceilf((box->upper[i] - box->lower[i]) / cell - 1e-3f);
+        out[i] = (cells < 1 ? 1 : cells) + 1;
+    }
+    dims->w = 1;
+    return cell;
+}
+
+static uint64_t volume_of(const ivec4 *dims)
+{
+    return (uint64_t)dims->x * (uint64_t)dims->y * (uint64_t)dims->z;
+}
+
+/* Everything that the scene shows, lamps included: what the world's medium should fill. */
+static struct box scene_box(const struct renderer *renderer, const struct snapshot *snapshot)
+{
+    struct box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    const struct geometry *geometry = &renderer->geometry;
+    if (geometry->lower[0] <= geometry->upper[0])
+        box_join(&box, geometry->lower, geometry->upper);
+    if (renderer->medium.dims[0])
+        box_join(&box, renderer->medium.lower, renderer->medium.upper);
+    const struct table *lights = &snapshot->tables[BRUME_KIND_LIGHT];
+    for (uint32_t i = 0; i < lights->count; ++i) {
+        const brume_light *light = &((struct light_block *)lights->entries[i].block)->light;
+        if (light->type != BRUME_LIGHT_SUN)
+            box_join(&box, light->world_from_light + 12, light->world_from_light + 12);
+    }
+    if (box_is_empty(&box))
+        box = (struct box){{-10, -10, -10}, {10, 10, 10}};
+    return box;
+}
+
+static void layout_fog(struct renderer *renderer, const struct snapshot *snapshot)
+{
+    struct gpu_frame *frame = &renderer->frame;
+    const brume_world *world = &snapshot->world;
+    if (!world->has_volume)
+        return;
+    struct box box = scene_box(renderer, snapshot);
+    const int unlimited = world->reach < 0.0f;
+    float diagonal = 0.0f;
+    for (int i = 0; i < 3; ++i)
+        diagonal += (box.upper[i] - box.lower[i]) * (box.upper[i] - box.lower[i]);
+    diagonal = sqrtf(diagonal);
+    const float margin = unlimited             ? 1e7f
+                         : world->reach > 0.0f ? world->reach
+                                               : fmaxf(0.5f * diagonal, 1.0f);
+    for (int i = 0; i < 3; ++i) {
+        box.lower[i] -= margin;
+        box.upper[i] += margin;
+    }
+    float sigma_t[3];
+    for (int c = 0; c < 3; ++c)
+        sigma_t[c] = world->sigma_s[c] + world->sigma_a[c];
+    frame->fog_lower = pack(box.lower, 1.0f);
+    frame->fog_upper = pack(box.upper, unlimited ? 1.0f : 0.0f);
+    frame->fog_sigma_s = pack(world->sigma_s, world->g);
+    frame->fog_sigma_t = pack(sigma_t, 0.0f);
+    frame->fog_emission = pack(world->emission, 0.0f);
+}
+
+/* Tiles stack along z as far as a texture goes, then along y. */
+static int layout_tiles(struct renderer *renderer, int limit)
+{
+    const ivec4 dims = renderer->frame.lattice_dims;
+    struct shadows *shadows = &renderer->shadows;
+    const int per_column = limit / dims.z;
+    const int columns = limit / dims.y;
+    uint32_t tile = 0;
+    for (uint32_t i = 0; i < shadows->light_count; ++i) {
+        struct gpu_light *light = &shadows->lights[i];
+        const int dark =
+            light->radiance.x <= 0.0f && light->radiance.y <= 0.0f && light->radiance.z <= 0.0f;
+        light->info.w = !dark;
+        if (dark)
+            continue;
+        light->info.y = (tile / (uint32_t)per_column) * (uint32_t)dims.y;
+        light->info.z = (tile % (uint32_t)per_column) * (uint32_t)dims.z;
+        ++tile;
+    }
+    const int used_columns = ((int)tile + per_column - 1) / per_column;
+    renderer->tau_size[0] = tile ? dims.x : 0;
+    renderer->tau_size[1] = used_columns * dims.y;
+    renderer->tau_size[2] = ((int)tile < per_column ? (int)tile : per_column) * dims.z;
+    return used_columns <= columns;
+}
+
+brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
+                            const struct render_request *request)
+{
+    struct gpu_frame *frame = &renderer->frame;
+    const struct medium_textures *medium = &renderer->medium;
+    const brume_settings *settings = &request->settings;
+    frame->medium_dims = (ivec4){0};
+    frame->lattice_dims = (ivec4){0};
+    frame->sky_dims = (ivec4){0};
+    frame->fog_lower = frame->fog_upper = (vec4){0};
+    frame->fog_sigma_s = frame->fog_sigma_t = frame->fog_emission = (vec4){0};
+    memset(renderer->tau_size, 0, sizeof renderer->tau_size);
+    layout_fog(renderer, request->snapshot);
+    /* The sky's lattice needs a cell's size to march by, medium or not. */
+    frame->medium_lower = (vec4){0, 0, 0, 1};
+
+    const uint64_t share = settings->memory_budget / 4;
+    int resolution = settings->lattice_resolution;
+    if (medium->dims[0]) {
+        struct box box;
+        memcpy(box.lower, medium->lower, sizeof box.lower);
+        memcpy(box.upper, medium->upper, sizeof box.upper);
+        frame->medium_lower = pack(medium->lower, medium->cell);
+        frame->medium_upper = pack(medium->upper, medium->emits ? 1.0f : 0.0f);
+        frame->medium_dims = (ivec4){medium->dims[0], medium->dims[1], medium->dims[2], 1};
+        for (;; resolution = resolution * 3 / 4) {
+            frame->lattice_lower = pack(medium->lower, nodes_of(&box, resolution,
+                                                                &frame->lattice_dims));
+            const uint64_t bytes = volume_of(&frame->lattice_dims) * NODE_BYTES *
+                                   renderer->shadows.light_count;
+            if ((bytes <= share && layout_tiles(renderer, gpu->context.info.max_texture_3d)) ||
+                resolution <= 4)
+                break;
+        }
+        if (resolution < settings->lattice_resolution)
+            job_warn(request->control, "LATTICE_COARSER",
+                     "transport lattice of %d instead of %d cells, to keep the memory budget",
+                     resolution, settings->lattice_resolution);
+    }
+
+    const int fog = frame->fog_lower.w != 0.0f;
+    if (renderer->shadows.world_count && (medium->dims[0] || fog)) {
+        struct box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+        if (medium->dims[0])
+            box_join(&box, medium->lower, medium->upper);
+        if (fog) {
+            const vec4 low = frame->fog_lower, high = frame->fog_upper;
+            box_join(&box, (float[3]){low.x, low.y, low.z}, (float[3]){high.x, high.y, high.z});
+        }
+        int sky = resolution / 2 < 4 ? 4 : resolution / 2;
+        for (;; sky = sky * 3 / 4) {
+            frame->sky_lower = pack(box.lower, nodes_of(&box, sky, &frame->sky_dims));
+            if (volume_of(&frame->sky_dims) * SKY_NODE_BYTES <= share || sky <= 4)
+                break;
+        }
+    }
+    return BRUME_OK;
+}

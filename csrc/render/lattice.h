@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Where the frame's lattices stand: the medium's, the transport's nodes, the sky's, the box of the
+ * world's medium. Arithmetic alone; any thread. */
+#ifndef BRUME_RENDER_LATTICE_H
+#define BRUME_RENDER_LATTICE_H
+
+#include "render/renderer.h"
+
+/* Fills the lattice fields of renderer->frame, the tau tiles of the lights, renderer->tau_size.
+ * Keeps the transport within its share of the budget, with a warning where that makes it coarser. */
+brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
+                            const struct render_request *request);
+
+#endif

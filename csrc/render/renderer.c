@@ -1,0 +1,330 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Running the stages. */
+#include "render/renderer.h"
+#include "base/result.h"
+#include "gl/timer.h"
+#include "math/frame.h"
+#include "render/lattice.h"
+#include "scene/medium.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Steps of a ray through the world's medium where there is no lattice. */
+#define FOG_STEPS 24
+
+struct run {
+    struct gpu *gpu;
+    struct renderer *renderer;
+    struct render_request *request;
+};
+
+/* --- Signatures: what a stage depends on -------------------------------------------------- */
+
+static uint64_t mix(uint64_t hash, uint64_t value)
+{
+    /* FNV-1a over the bytes */
+    for (int i = 0; i < 8; ++i) {
+        hash ^= (value >> (8 * i)) & 0xff;
+        hash *= 0x100000001b3ull;
+    }
+    return hash;
+}
+
+static uint64_t signature(const uint64_t *values, size_t count)
+{
+    uint64_t hash = 0xcbf29ce484222325ull;
+    for (size_t i = 0; i < count; ++i)
+        hash = mix(hash, values[i]);
+    return hash ? hash : 1;
+}
+
+static uint64_t float_bits(float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+/* Runs the stage if its inputs changed since its last success. */
+static brume_result run_if_changed(struct run *run, enum brume_stage stage,
+                                   const uint64_t *inputs, size_t count,
+                                   brume_result (*work)(struct run *))
+{
+    struct stage_record *record = &run->renderer->stages[stage];
+    brume_stage_stats *stats = &run->request->stats.stages[stage];
+    const uint64_t wanted = signature(inputs, count);
+    if (record->signature == wanted)
+        return BRUME_OK;
+    if (job_cancelled(run->request->control))
+        return fail(BRUME_E_CANCELLED, "cancelled");
+    record->signature = 0;
+    ++record->runs;
+    ++record->revision;
+    struct timer timer;
+    timer_begin(&timer, brume_stage_name(stage));
+    const brume_result result = work(run);
+    timer_end(&timer, &stats->wall_ms, &stats->gpu_ms);
+    if (result == BRUME_OK)
+        record->signature = wanted;
+    return result;
+}
+
+/* --- Stages that outlive the view --------------------------------------------------------- */
+
+static brume_result work_upload(struct run *run)
+{
+    job_report(run->request->control, BRUME_STAGE_UPLOAD, 0.0f);
+    return geometry_sync(run->gpu, &run->renderer->geometry, run->request->snapshot,
+                         run->request->control);
+}
+
+static brume_result work_medium(struct run *run)
+{
+    const struct render_request *request = run->request;
+    const struct table *table = &request->snapshot->tables[BRUME_KIND_VOLUME];
+    job_report(request->control, BRUME_STAGE_MEDIUM, 0.01f);
+    struct volume **volumes = calloc((size_t)table->count + 1, sizeof *volumes);
+    if (!volumes)
+        return fail(BRUME_E_MEMORY, "no memory for %u volumes", table->count);
+    for (uint32_t i = 0; i < table->count; ++i)
+        volumes[i] = ((struct volume_block *)table->entries[i].block)->volume;
+    struct medium_lattice lattice = {0};
+    brume_result result =
+        medium_build(volumes, table->count, request->settings.medium_resolution,
+                     request->settings.memory_budget / 4 / MEDIUM_CELL_BYTES,
+                     job_cancelled_callback, request->control, &lattice);
+    free(volumes);
+    if (result == BRUME_OK) {
+        if (lattice.coarser)
+            job_warn(request->control, "MEDIUM_COARSER",
+                     "medium lattice of %d x %d x %d cells instead of %d along the longest side, "
+                     "to keep the memory budget",
+                     lattice.dims[0], lattice.dims[1], lattice.dims[2],
+                     request->settings.medium_resolution);
+        result = medium_textures_upload(run->gpu, &run->renderer->medium, &lattice);
+        medium_finish(&lattice);
+    }
+    return result;
+}
+
+static void set_world(struct run *run)
+{
+    struct renderer *renderer = run->renderer;
+    struct gpu_frame *frame = &renderer->frame;
+    const brume_world *world = &run->request->snapshot->world;
+    const struct gpu_image *image = geometry_image(&renderer->geometry, world->image);
+    frame->world_color = (vec4){world->color[0], world->color[1], world->color[2],
+                                image ? 1.0f : 0.0f};
+    if (world->image_from_world[15] != 0.0f)
+        memcpy(frame->image_from_world.m, world->image_from_world, sizeof world->image_from_world);
+    else
+        mat4_identity(frame->image_from_world.m);
+    const uint32_t count = renderer->shadows.world_count;
+    const uint32_t samples = run->request->view.samples;
+    frame->world = (uvec4){renderer->shadows.world_first, count, (count + samples - 1) / samples, 0};
+    frame->counts = (uvec4){renderer->shadows.light_count, (uint32_t)renderer->shadows.side, 0, 0};
+    glBindTextureUnit(SLOT_WORLD, image ? image->texture.id : 0);
+}
+
+static brume_result bind_frame(struct run *run)
+{
+    struct renderer *renderer = run->renderer;
+    TRY(buffer_update(&run->gpu->memory, &renderer->frame_block, FOR_TARGET,
+                      sizeof renderer->frame, &renderer->frame, "frame"));
+    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_FRAME, renderer->frame_block.id);
+    return BRUME_OK;
+}
+
+static brume_result work_shadow(struct run *run)
+{
+    struct renderer *renderer = run->renderer;
+    const struct render_request *request = run->request;
+    job_report(request->control, BRUME_STAGE_SHADOW, 0.02f);
+    TRY(shadows_layout(run->gpu, &renderer->shadows, request->snapshot, &request->settings,
+                       &renderer->geometry, request->settings.memory_budget / 3,
+                       request->control));
+    TRY(shadows_upload(run->gpu, &renderer->shadows));
+    return shadows_render(run->gpu, &renderer->shadows, &renderer->geometry, request->control);
+}
+
+static brume_result work_transport(struct run *run)
+{
+    struct renderer *renderer = run->renderer;
+    const struct render_request *request = run->request;
+    const struct method *method = method_find(request->settings.method);
+    job_report(request->control, BRUME_STAGE_TRANSPORT, 0.1f);
+    TRY(lattice_layout(run->gpu, renderer, request));
+    TRY(shadows_upload(run->gpu, &renderer->shadows));
+    set_world(run);
+    TRY(bind_frame(run));
+    medium_textures_bind(&renderer->medium);
+    shadows_bind(&renderer->shadows);
+    const struct transport_input input = {
+        .gpu = run->gpu,
+        .medium = &renderer->medium,
+        .settings = &request->settings,
+        .control = request->control,
+        .frame = &renderer->frame,
+        .lights = renderer->shadows.lights,
+        .light_count = renderer->shadows.light_count,
+        .tau_size = {renderer->tau_size[0], renderer->tau_size[1], renderer->tau_size[2]},
+    };
+    return method->run(&renderer->transport, &input);
+}
+
+/* --- The view ----------------------------------------------------------------------------- */
+
+static brume_result stage_timed(struct run *run, enum brume_stage stage, uint32_t sample,
+                                brume_result (*work)(struct run *, uint32_t))
+{
+    brume_stage_stats *stats = &run->request->stats.stages[stage];
+    const brume_view *view = &run->request->view;
+    if (job_cancelled(run->request->control))
+        return fail(BRUME_E_CANCELLED, "cancelled");
+    job_report(run->request->control, stage,
+               0.25f + 0.74f * (float)sample / (float)view->samples);
+    struct timer timer;
+    timer_begin(&timer, brume_stage_name(stage));
+    const brume_result result = work(run, sample);
+    timer_end(&timer, &stats->wall_ms, &stats->gpu_ms);
+    return result;
+}
+
+static brume_result work_gbuffer(struct run *run, uint32_t sample)
+{
+    struct renderer *renderer = run->renderer;
+    return view_gbuffer(run->gpu, &renderer->targets, &renderer->geometry, &run->request->view,
+                        sample);
+}
+
+static brume_result work_shade(struct run *run, uint32_t sample)
+{
+    struct renderer *renderer = run->renderer;
+    view_frame(&run->request->view, sample, &renderer->frame);
+    TRY(bind_frame(run));
+    return view_shade(run->gpu, &renderer->targets, &run->request->view);
+}
+
+static brume_result work_march(struct run *run, uint32_t sample)
+{
+    struct renderer *renderer = run->renderer;
+    (void)sample;
+    return view_march(run->gpu, &renderer->targets, &run->request->view, &renderer->frame,
+                      &renderer->frame_block, run->request->control);
+}
+
+static brume_result work_passes(struct run *run, uint32_t sample)
+{
+    (void)sample;
+    const struct render_request *request = run->request;
+    for (uint32_t pass = 0; pass < BRUME_PASS_COUNT; ++pass)
+        if (request->pixels[pass])
+            TRY(view_read(&run->renderer->targets, &request->view, pass, request->view.samples,
+                          request->pixels[pass]));
+    return context_check("reading the picture");
+}
+
+static brume_result run_view(struct run *run)
+{
+    struct renderer *renderer = run->renderer;
+    struct render_request *request = run->request;
+    const brume_view *view = &request->view;
+    TRY(view_begin(run->gpu, &renderer->targets, view));
+    set_world(run);
+    const float cell = renderer->medium.dims[0] ? renderer->medium.cell : 1.0f;
+    renderer->frame.march = (vec4){cell * request->settings.step, FOG_STEPS, 0.0f, 0.0f};
+    medium_textures_bind(&renderer->medium);
+    shadows_bind(&renderer->shadows);
+    transport_bind(&renderer->transport);
+    for (uint32_t sample = 0; sample < view->samples; ++sample) {
+        TRY(stage_timed(run, BRUME_STAGE_GBUFFER, sample, work_gbuffer));
+        TRY(stage_timed(run, BRUME_STAGE_SHADE, sample, work_shade));
+        TRY(stage_timed(run, BRUME_STAGE_MARCH, sample, work_march));
+        pthread_mutex_lock(&request->control->mutex);
+        request->control->samples_done = sample + 1;
+        pthread_mutex_unlock(&request->control->mutex);
+    }
+    for (int stage = BRUME_STAGE_GBUFFER; stage < BRUME_STAGE_COUNT; ++stage) {
+        ++renderer->stages[stage].runs;
+        ++renderer->stages[stage].revision;
+    }
+    return stage_timed(run, BRUME_STAGE_PASSES, view->samples - 1, work_passes);
+}
+
+/* --- All of it ---------------------------------------------------------------------------- */
+
+static void fill_stats(struct run *run, double started)
+{
+    brume_stats *stats = &run->request->stats;
+    const struct renderer *renderer = run->renderer;
+    const struct memory *memory = &run->gpu->memory;
+    for (int stage = 0; stage < BRUME_STAGE_COUNT; ++stage) {
+        stats->stages[stage].runs = renderer->stages[stage].runs;
+        stats->stages[stage].revision = renderer->stages[stage].revision;
+    }
+    stats->total_ms = clock_ms() - started;
+    stats->medium_bytes = memory->bytes[FOR_MEDIUM];
+    stats->transport_bytes = memory->bytes[FOR_TRANSPORT];
+    stats->shadow_bytes = memory->bytes[FOR_SHADOW];
+    stats->mesh_bytes = memory->bytes[FOR_MESH];
+    stats->image_bytes = memory->bytes[FOR_IMAGE];
+    stats->target_bytes = memory->bytes[FOR_TARGET];
+    stats->total_bytes = memory->total;
+    stats->peak_bytes = memory->peak;
+    memcpy(stats->medium_dims, renderer->medium.dims, sizeof stats->medium_dims);
+    memcpy(stats->transport_dims, &renderer->frame.lattice_dims, sizeof stats->transport_dims);
+    stats->light_count = renderer->shadows.light_count;
+    stats->triangle_count = renderer->geometry.triangle_count;
+    stats->samples = run->request->view.samples;
+}
+
+brume_result renderer_run(struct gpu *gpu, struct renderer *renderer,
+                          struct render_request *request)
+{
+    struct run run = {gpu, renderer, request};
+    const double started = clock_ms();
+    const struct snapshot *snapshot = request->snapshot;
+    const brume_settings *settings = &request->settings;
+    const struct stage_record *stages = renderer->stages;
+    gpu->memory.peak = gpu->memory.total;
+
+    const uint64_t upload[] = {snapshot->tables[BRUME_KIND_MESH].revision,
+                               snapshot->tables[BRUME_KIND_INSTANCES].revision,
+                               snapshot->tables[BRUME_KIND_MATERIAL].revision,
+                               snapshot->tables[BRUME_KIND_IMAGE].revision};
+    TRY(run_if_changed(&run, BRUME_STAGE_UPLOAD, upload, 4, work_upload));
+    const uint64_t medium[] = {snapshot->tables[BRUME_KIND_VOLUME].revision,
+                               (uint64_t)settings->medium_resolution, settings->memory_budget};
+    TRY(run_if_changed(&run, BRUME_STAGE_MEDIUM, medium, 3, work_medium));
+    const uint64_t shadow[] = {stages[BRUME_STAGE_UPLOAD].revision,
+                               snapshot->tables[BRUME_KIND_LIGHT].revision,
+                               snapshot->world_revision,
+                               (uint64_t)settings->shadow_resolution,
+                               (uint64_t)settings->light_samples,
+                               (uint64_t)settings->world_samples,
+                               settings->memory_budget};
+    TRY(run_if_changed(&run, BRUME_STAGE_SHADOW, shadow, 7, work_shadow));
+    const uint64_t transport[] = {stages[BRUME_STAGE_MEDIUM].revision,
+                                  stages[BRUME_STAGE_SHADOW].revision,
+                                  (uint64_t)settings->lattice_resolution,
+                                  settings->method,
+                                  settings->memory_budget,
+                                  float_bits(snapshot->world.reach)};
+    TRY(run_if_changed(&run, BRUME_STAGE_TRANSPORT, transport, 6, work_transport));
+    const brume_result result = run_view(&run);
+    fill_stats(&run, started);
+    return result;
+}
+
+void renderer_finish(struct gpu *gpu, struct renderer *renderer)
+{
+    geometry_finish(gpu, &renderer->geometry);
+    medium_textures_finish(gpu, &renderer->medium);
+    shadows_finish(gpu, &renderer->shadows);
+    transport_finish(gpu, &renderer->transport);
+    view_finish(gpu, &renderer->targets);
+    buffer_finish(&gpu->memory, &renderer->frame_block);
+    memset(renderer, 0, sizeof *renderer);
+}

@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The stages of a frame, each run only when one of its inputs changed. One renderer a scene; device
+ * thread. */
+#ifndef BRUME_RENDER_RENDERER_H
+#define BRUME_RENDER_RENDERER_H
+
+#include "render/geometry.h"
+#include "render/shadow.h"
+#include "render/view.h"
+#include "transport/method.h"
+
+struct stage_record {
+    uint64_t signature; /* of the inputs of the last run; 0: never, or it failed */
+    uint64_t revision, runs;
+};
+
+struct renderer {
+    struct stage_record stages[BRUME_STAGE_COUNT];
+    struct geometry geometry;
+    struct medium_textures medium;
+    struct shadows shadows;
+    struct transport transport;
+    struct view_targets targets;
+    struct gpu_frame frame;
+    struct buffer frame_block;
+    int tau_size[3];
+};
+
+/* What one job asks for and gets. */
+struct render_request {
+    const struct snapshot *snapshot;
+    brume_settings settings; /* defaults filled in */
+    brume_view view;
+    struct job_control *control;
+    float *pixels[BRUME_PASS_COUNT]; /* given by the caller for each wanted pass */
+    brume_stats stats;
+};
+
+brume_result renderer_run(struct gpu *gpu, struct renderer *renderer,
+                          struct render_request *request);
+void renderer_finish(struct gpu *gpu, struct renderer *renderer);
+
+#endif

@@ -1,0 +1,282 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Shadow maps: perspective faces around lamps, orthographic maps along suns and the world's
+ * samples. */
+#include "render/shadow.h"
+#include "base/result.h"
+#include "math/frame.h"
+#include "scene/light.h"
+#include "scene/world.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MAX_LAYERS 2048
+
+static float radius_of(const struct geometry *geometry, float center[3])
+{
+    float square = 0.0f;
+    for (int i = 0; i < 3; ++i) {
+        center[i] = 0.5f * (geometry->lower[i] + geometry->upper[i]);
+        const float half = 0.5f * (geometry->upper[i] - geometry->lower[i]);
+        square += half * half;
+    }
+    return sqrtf(square);
+}
+
+/* A map along `towards` (unit, to the light) that holds all geometry. */
+static void orthographic_view(const struct geometry *geometry, const vec4 *towards, int side,
+                              struct gpu_shadow_view *out)
+{
+    float center[3], view[16], projection[16], lower[3], upper[3];
+    const float radius = fmaxf(radius_of(geometry, center), 1e-4f);
+    const float direction[3] = {-towards->x, -towards->y, -towards->z};
+    const float eye[3] = {center[0] - direction[0] * radius, center[1] - direction[1] * radius,
+                          center[2] - direction[2] * radius};
+    mat4_look(eye, direction, view);
+    mat4_bounds(view, geometry->lower, geometry->upper, lower, upper);
+    /* Square texels, and a texel of room for the filter at the rim. */
+    const float width = fmaxf(upper[0] - lower[0], upper[1] - lower[1]) * (1.0f + 4.0f / (float)side);
+    const float x = 0.5f * (lower[0] + upper[0]), y = 0.5f * (lower[1] + upper[1]);
+    const float near_ = -upper[2] - 1e-3f * radius, far_ = -lower[2] + 1e-3f * radius;
+    mat4_orthographic(x - 0.5f * width, x + 0.5f * width, y - 0.5f * width, y + 0.5f * width, near_,
+                      far_, projection);
+    /* Reversed depth: 1 at near, 0 at far. */
+    for (int column = 0; column < 4; ++column)
+        projection[4 * column + 2] = 0.0f;
+    projection[10] = 1.0f / (far_ - near_);
+    projection[14] = far_ / (far_ - near_);
+    mat4_multiply(projection, view, out->clip_from_world.m);
+    out->range = (vec4){1.0f, near_, far_, width / (float)side};
+}
+
+static void perspective_view(const float eye[3], const float direction[3], float tangent, int side,
+                             float near_, struct gpu_shadow_view *out)
+{
+    float view[16];
+    mat4_look(eye, direction, view);
+    tangent *= 1.0f + 4.0f / (float)side; /* room for the filter at the rim */
+    /* Reversed depth without a far plane: near / distance. */
+    const float projection[16] = {1.0f / tangent, 0, 0, 0, 0, 1.0f / tangent, 0, 0,
+                                  0,              0, 0, -1, 0, 0,             near_, 0};
+    mat4_multiply(projection, view, out->clip_from_world.m);
+    out->range = (vec4){0.0f, near_, 0.0f, 2.0f * tangent / (float)side};
+}
+
+/* Faces in the order of shadow_face() in shaders/lib/shadow.glsl. */
+static void lamp_views(const brume_light *light, const struct gpu_light *gpu,
+                       const struct gpu_light_sample *sample, const struct geometry *geometry,
+                       int side, struct gpu_shadow_view *out)
+{
+    float u[3], v[3], forward[3], center[3];
+    const float eye[3] = {sample->position.x, sample->position.y, sample->position.z};
+    const float near_ = fmaxf(1e-4f * radius_of(geometry, center), 1e-4f);
+    light_frame(gpu, u, v, forward);
+    const uint32_t faces = light_faces(light);
+    if (faces == 1) {
+        perspective_view(eye, forward, tanf(0.5f * light->spot_angle), side, near_, out);
+        return;
+    }
+    for (uint32_t face = 0; face < faces; ++face) {
+        float direction[3];
+        for (int i = 0; i < 3; ++i) {
+            const float axes[6] = {forward[i], u[i], -u[i], v[i], -v[i], -forward[i]};
+            direction[i] = axes[face];
+        }
+        perspective_view(eye, direction, 1.0f, side, near_, &out[face]);
+    }
+}
+
+/* --- Layout ------------------------------------------------------------------------------- */
+
+static brume_result allocate(struct shadows *shadows, const struct snapshot *snapshot,
+                             uint32_t light_samples, uint32_t world_samples_)
+{
+    const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
+    uint32_t samples = world_samples_, layers = world_samples_;
+    for (uint32_t i = 0; i < table->count; ++i) {
+        const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
+        const uint32_t count = light_sample_count(light, light_samples);
+        samples += count;
+        if (light->cast_shadow)
+            layers += count * light_faces(light);
+    }
+    free(shadows->lights);
+    free(shadows->samples);
+    free(shadows->views);
+    shadows->lights = calloc((size_t)table->count + 1, sizeof *shadows->lights);
+    shadows->samples = calloc((size_t)samples + 1, sizeof *shadows->samples);
+    shadows->views = calloc((size_t)layers + 1, sizeof *shadows->views);
+    shadows->light_count = table->count;
+    shadows->sample_count = samples;
+    shadows->view_count = layers;
+    if (!shadows->lights || !shadows->samples || !shadows->views)
+        return fail(BRUME_E_MEMORY, "no memory for %u lights", table->count);
+    return BRUME_OK;
+}
+
+static uint32_t layer_count(const struct snapshot *snapshot, uint32_t samples, uint32_t world)
+{
+    const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
+    uint32_t layers = world;
+    for (uint32_t i = 0; i < table->count; ++i) {
+        const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
+        if (light->cast_shadow)
+            layers += light_sample_count(light, samples) * light_faces(light);
+    }
+    return layers;
+}
+
+static int world_is_black(const brume_world *world)
+{
+    return world->color[0] <= 0.0f && world->color[1] <= 0.0f && world->color[2] <= 0.0f;
+}
+
+brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
+                            const struct snapshot *snapshot, const brume_settings *settings,
+                            const struct geometry *geometry, uint64_t budget,
+                            struct job_control *control)
+{
+    (void)gpu;
+    /* A world medium without limit lets nothing through from infinitely far. */
+    const int distant_light = !(snapshot->world.has_volume && snapshot->world.reach < 0.0f);
+    uint32_t wanted = (uint32_t)settings->light_samples;
+    uint32_t world_count = 0;
+    if (!world_is_black(&snapshot->world) && distant_light)
+        world_count = (uint32_t)settings->world_samples;
+    const int casters = geometry->lower[0] <= geometry->upper[0];
+
+    while (wanted > 1 && layer_count(snapshot, wanted, world_count) > MAX_LAYERS)
+        wanted /= 2;
+    if (wanted < (uint32_t)settings->light_samples)
+        job_warn(control, "LIGHT_SAMPLES_FEWER",
+                 "%u shadow maps a lamp instead of %d: more than %d do not fit", wanted,
+                 settings->light_samples, MAX_LAYERS);
+    const uint32_t layers = layer_count(snapshot, wanted, world_count);
+    if (layers > MAX_LAYERS)
+        return fail(BRUME_E_UNSUPPORTED, "%u lamps need more than %d shadow maps",
+                    snapshot->tables[BRUME_KIND_LIGHT].count, MAX_LAYERS);
+    int side = settings->shadow_resolution;
+    while (side > 64 && (uint64_t)layers * (uint64_t)side * (uint64_t)side * 4 > budget)
+        side /= 2;
+    if (side < settings->shadow_resolution)
+        job_warn(control, "SHADOWS_COARSER",
+                 "shadow maps of %d instead of %d texels, to keep the memory budget", side,
+                 settings->shadow_resolution);
+    TRY(allocate(shadows, snapshot, wanted, world_count));
+    shadows->side = side;
+
+    const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
+    uint32_t next_sample = 0, next_layer = 0;
+    for (uint32_t i = 0; i < table->count; ++i) {
+        const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
+        struct gpu_light *out = &shadows->lights[i];
+        light_to_gpu(light, out);
+        if (light->type == BRUME_LIGHT_SUN && !distant_light)
+            out->radiance = (vec4){0};
+        const uint32_t count = light_sample_count(light, wanted), faces = light_faces(light);
+        out->samples.x = next_sample;
+        out->samples.y = count;
+        out->samples.z = faces;
+        for (uint32_t s = 0; s < count; ++s, ++next_sample) {
+            struct gpu_light_sample *sample = &shadows->samples[next_sample];
+            light_sample(light, out, s, count, sample);
+            if (!light->cast_shadow || !casters)
+                continue;
+            sample->position.w = (float)next_layer;
+            if (light->type == BRUME_LIGHT_SUN)
+                orthographic_view(geometry, &sample->position, side, &shadows->views[next_layer]);
+            else
+                lamp_views(light, out, sample, geometry, side, &shadows->views[next_layer]);
+            next_layer += faces;
+        }
+    }
+    shadows->world_first = next_sample;
+    shadows->world_count = world_count;
+    if (world_count) {
+        const struct entry *image =
+            table_find(&snapshot->tables[BRUME_KIND_IMAGE], snapshot->world.image);
+        float world_from_image[16];
+        if (!mat4_invert(snapshot->world.image_from_world, world_from_image))
+            mat4_identity(world_from_image);
+        TRY(world_samples(&snapshot->world, image ? (struct image_block *)image->block : NULL,
+                          world_from_image, world_count, shadows->samples + next_sample));
+        for (uint32_t s = 0; s < world_count && casters; ++s) {
+            struct gpu_light_sample *sample = &shadows->samples[next_sample + s];
+            sample->position.w = (float)next_layer;
+            orthographic_view(geometry, &sample->position, side, &shadows->views[next_layer++]);
+        }
+    }
+    shadows->view_count = next_layer;
+    return BRUME_OK;
+}
+
+brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows)
+{
+    struct memory *memory = &gpu->memory;
+    TRY(buffer_update(memory, &shadows->light_buffer, FOR_SHADOW,
+                      shadows->light_count * sizeof *shadows->lights, shadows->lights, "lights"));
+    TRY(buffer_update(memory, &shadows->sample_buffer, FOR_SHADOW,
+                      shadows->sample_count * sizeof *shadows->samples, shadows->samples,
+                      "light samples"));
+    TRY(buffer_update(memory, &shadows->view_buffer, FOR_SHADOW,
+                      shadows->view_count * sizeof *shadows->views, shadows->views,
+                      "shadow views"));
+    const int layers = shadows->view_count ? (int)shadows->view_count : 1;
+    return texture_ensure(memory, &shadows->maps, FOR_SHADOW, GL_TEXTURE_2D_ARRAY,
+                          GL_DEPTH_COMPONENT32F, shadows->side, shadows->side, layers, 1,
+                          "shadow maps");
+}
+
+brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,
+                            struct job_control *control)
+{
+    if (!shadows->framebuffer) {
+        glCreateFramebuffers(1, &shadows->framebuffer);
+        glNamedFramebufferDrawBuffer(shadows->framebuffer, GL_NONE);
+    }
+    /* Depths are read one by one: gathering and fetching want no filter and no comparison. */
+    glTextureParameteri(shadows->maps.id, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTextureParameteri(shadows->maps.id, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glBindFramebuffer(GL_FRAMEBUFFER, shadows->framebuffer);
+    glViewport(0, 0, shadows->side, shadows->side);
+    for (uint32_t i = 0; i < shadows->view_count; ++i) {
+        if (job_cancelled(control))
+            return fail(BRUME_E_CANCELLED, "cancelled");
+        glNamedFramebufferTextureLayer(shadows->framebuffer, GL_DEPTH_ATTACHMENT, shadows->maps.id,
+                                       0, (GLint)i);
+        static const float far_ = 0.0f;
+        glClearNamedFramebufferfv(shadows->framebuffer, GL_DEPTH, 0, &far_);
+        const struct gpu_draw stage = {.clip_from_world = shadows->views[i].clip_from_world,
+                                       .info = {i, 0, 0, 0}};
+        TRY(geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_SHADOW, 1));
+        if (gpu->context.info.software)
+            glFinish(); /* so that a cancel comes through between two maps */
+        job_report(control, BRUME_STAGE_SHADOW, 0.02f + 0.08f * (float)(i + 1) /
+                                                            (float)shadows->view_count);
+    }
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    return BRUME_OK;
+}
+
+void shadows_bind(const struct shadows *shadows)
+{
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_LIGHTS, shadows->light_buffer.id);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_LIGHT_SAMPLES, shadows->sample_buffer.id);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_SHADOW_VIEWS, shadows->view_buffer.id);
+    glBindTextureUnit(SLOT_SHADOW, shadows->maps.id);
+}
+
+void shadows_finish(struct gpu *gpu, struct shadows *shadows)
+{
+    buffer_finish(&gpu->memory, &shadows->light_buffer);
+    buffer_finish(&gpu->memory, &shadows->sample_buffer);
+    buffer_finish(&gpu->memory, &shadows->view_buffer);
+    texture_finish(&gpu->memory, &shadows->maps);
+    if (shadows->framebuffer)
+        glDeleteFramebuffers(1, &shadows->framebuffer);
+    free(shadows->lights);
+    free(shadows->samples);
+    free(shadows->views);
+    memset(shadows, 0, sizeof *shadows);
+}

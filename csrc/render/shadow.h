@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The lights on the GPU: samples that stand for their extent, and one shadow map a sample and face.
+ * Device thread. */
+#ifndef BRUME_RENDER_SHADOW_H
+#define BRUME_RENDER_SHADOW_H
+
+#include "render/geometry.h"
+
+struct shadows {
+    struct gpu_light *lights;
+    struct gpu_light_sample *samples;
+    struct gpu_shadow_view *views;
+    uint32_t light_count, sample_count, view_count;
+    uint32_t world_first, world_count; /* samples */
+    int side;                          /* texels */
+    struct buffer light_buffer, sample_buffer, view_buffer;
+    struct texture maps;
+    GLuint framebuffer;
+};
+
+/* Lights, samples and shadow views from the snapshot, for casters within the geometry's bounds.
+ * budget: bytes that the maps may take; their side is halved until it is kept. */
+brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
+                            const struct snapshot *snapshot, const brume_settings *settings,
+                            const struct geometry *geometry, uint64_t budget,
+                            struct job_control *control);
+/* Uploads them: the tiles in lights[].info may have been set in between. */
+brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows);
+brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,
+                            struct job_control *control);
+void shadows_bind(const struct shadows *shadows);
+void shadows_finish(struct gpu *gpu, struct shadows *shadows);
+
+#endif

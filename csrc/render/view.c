@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The view's stages. */
+#include "render/view.h"
+#include "base/result.h"
+#include "math/frame.h"
+#include "render/filter.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Rows of one dispatch on a CPU: a tenth of a second or so. */
+#define SOFTWARE_ROWS 64
+
+static int is_orthographic(const brume_view *view)
+{
+    return view->clip_from_view[15] != 0.0f;
+}
+
+static vec4 rotate(const float world_from_view[16], float x, float y, float z)
+{
+    const float v[3] = {x, y, z};
+    float out[3];
+    mat4_vector(world_from_view, v, out);
+    return (vec4){out[0], out[1], out[2], 0.0f};
+}
+
+static vec4 offset_by(vec4 base, vec4 x, float by_x, vec4 y, float by_y)
+{
+    return (vec4){base.x + by_x * x.x + by_y * y.x, base.y + by_x * x.y + by_y * y.y,
+                  base.z + by_x * x.z + by_y * y.z, 0.0f};
+}
+
+/* The sample's offset in normalised device coordinates. */
+static void sample_offset(const brume_view *view, uint32_t sample, float ndc[2])
+{
+    filter_offset(sample, view->filter_width, ndc);
+    ndc[0] *= 2.0f / (float)view->width;
+    ndc[1] *= 2.0f / (float)view->height;
+}
+
+void view_frame(const brume_view *view, uint32_t sample, struct gpu_frame *frame)
+{
+    const float *p = view->clip_from_view;
+    float world_from_view[16], ndc[2];
+    mat4_invert(view->view_from_world, world_from_view); /* checked when the job was made */
+    sample_offset(view, sample, ndc);
+    memcpy(frame->view_from_world.m, view->view_from_world, sizeof frame->view_from_world.m);
+    const float dx = 1.0f / p[0], dy = 1.0f / p[5];
+    const vec4 eye = {world_from_view[12], world_from_view[13], world_from_view[14], 0.0f};
+    if (is_orthographic(view)) {
+        frame->ray_origin_x = rotate(world_from_view, dx, 0.0f, 0.0f);
+        frame->ray_origin_y = rotate(world_from_view, 0.0f, dy, 0.0f);
+        frame->ray_origin =
+            offset_by(eye, frame->ray_origin_x, ndc[0] - p[12], frame->ray_origin_y, ndc[1] - p[13]);
+        frame->ray_direction = rotate(world_from_view, 0.0f, 0.0f, -1.0f);
+        frame->ray_direction_x = frame->ray_direction_y = (vec4){0};
+    } else {
+        frame->ray_direction_x = rotate(world_from_view, dx, 0.0f, 0.0f);
+        frame->ray_direction_y = rotate(world_from_view, 0.0f, dy, 0.0f);
+        frame->ray_direction = offset_by(rotate(world_from_view, 0.0f, 0.0f, -1.0f),
+                                         frame->ray_direction_x, ndc[0] + p[8],
+                                         frame->ray_direction_y, ndc[1] + p[9]);
+        frame->ray_origin = eye;
+        frame->ray_origin_x = frame->ray_origin_y = (vec4){0};
+    }
+    frame->size = (ivec4){view->width, view->height, (int)sample, (int)view->seed};
+    frame->clip = (vec4){view->clip_near, view->clip_far, view->film_transparent ? 1.0f : 0.0f,
+                         (float)view->samples};
+    int slot = 0;
+    for (int pass = 0; pass < PASS_COUNT; ++pass) {
+        int *slots = &frame->pass_slots[pass / 4].x;
+        slots[pass % 4] = view->passes & (1u << pass) ? slot++ : -1;
+    }
+}
+
+static struct gpu_draw camera_draw(const brume_view *view, uint32_t sample)
+{
+    float world_from_view[16], projection[16], ndc[2];
+    const float near_ = view->clip_near, far_ = view->clip_far;
+    const int orthographic = is_orthographic(view);
+    mat4_invert(view->view_from_world, world_from_view);
+    sample_offset(view, sample, ndc);
+    memcpy(projection, view->clip_from_view, sizeof projection);
+    /* Reversed depth instead of the caller's: near / distance, or even from 1 to 0. */
+    projection[2] = projection[6] = projection[10] = projection[14] = 0.0f;
+    if (orthographic) {
+        projection[10] = 1.0f / (far_ - near_);
+        projection[14] = far_ / (far_ - near_);
+    } else {
+        projection[14] = near_;
+    }
+    for (int column = 0; column < 4; ++column) {
+        projection[4 * column] -= ndc[0] * projection[4 * column + 3];
+        projection[4 * column + 1] -= ndc[1] * projection[4 * column + 3];
+    }
+    struct gpu_draw draw = {.clip = {near_, far_, orthographic ? 1.0f : 0.0f, 0.0f},
+                            .info = {view->seed + sample, 0, 0, 0}};
+    mat4_multiply(projection, view->view_from_world, draw.clip_from_world.m);
+    draw.eye = orthographic ? rotate(world_from_view, 0.0f, 0.0f, -1.0f)
+                            : (vec4){world_from_view[12], world_from_view[13], world_from_view[14],
+                                     1.0f};
+    return draw;
+}
+
+static uint32_t pass_count(const brume_view *view)
+{
+    return (uint32_t)__builtin_popcount(view->passes & ((1u << PASS_COUNT) - 1u));
+}
+
+brume_result view_begin(struct gpu *gpu, struct view_targets *targets, const brume_view *view)
+{
+    struct {
+        struct texture *texture;
+        GLenum format, attachment;
+        const char *label;
+    } const list[] = {
+        {&targets->normal, GL_RGBA32F, GL_COLOR_ATTACHMENT0, "normal and depth"},
+        {&targets->diffuse, GL_RGBA16F, GL_COLOR_ATTACHMENT1, "diffuse reflectance"},
+        {&targets->specular, GL_RGBA16F, GL_COLOR_ATTACHMENT2, "specular reflectance"},
+        {&targets->emission, GL_RGBA16F, GL_COLOR_ATTACHMENT3, "emission"},
+        {&targets->depth, GL_DEPTH_COMPONENT32F, GL_DEPTH_ATTACHMENT, "depth"},
+        {&targets->surface, GL_RGBA32F, GL_NONE, "surface radiance"},
+    };
+    if (!targets->framebuffer)
+        glCreateFramebuffers(1, &targets->framebuffer);
+    for (size_t i = 0; i < sizeof list / sizeof *list; ++i) {
+        TRY(texture_ensure(&gpu->memory, list[i].texture, FOR_TARGET, GL_TEXTURE_2D, list[i].format,
+                           view->width, view->height, 1, 1, list[i].label));
+        if (list[i].attachment != GL_NONE)
+            glNamedFramebufferTexture(targets->framebuffer, list[i].attachment,
+                                      list[i].texture->id, 0);
+    }
+    static const GLenum buffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
+                                     GL_COLOR_ATTACHMENT2, GL_COLOR_ATTACHMENT3};
+    glNamedFramebufferDrawBuffers(targets->framebuffer, 4, buffers);
+    if (glCheckNamedFramebufferStatus(targets->framebuffer, GL_FRAMEBUFFER) !=
+        GL_FRAMEBUFFER_COMPLETE)
+        return fail(BRUME_E_GPU, "the driver refuses a %d x %d framebuffer", view->width,
+                    view->height);
+    const uint64_t bytes = (uint64_t)view->width * (uint64_t)view->height *
+                           (VIEW_PASS_PIXEL_BYTES * (uint64_t)pass_count(view));
+    if (targets->accumulation.bytes != bytes) {
+        buffer_finish(&gpu->memory, &targets->accumulation);
+        TRY(buffer_init(&gpu->memory, &targets->accumulation, FOR_TARGET, bytes, NULL,
+                        "accumulation"));
+    }
+    glClearNamedBufferData(targets->accumulation.id, GL_R32F, GL_RED, GL_FLOAT, NULL);
+    return BRUME_OK;
+}
+
+brume_result view_gbuffer(struct gpu *gpu, struct view_targets *targets, struct geometry *geometry,
+                          const brume_view *view, uint32_t sample)
+{
+    static const float zero[4];
+    glBindFramebuffer(GL_FRAMEBUFFER, targets->framebuffer);
+    glViewport(0, 0, view->width, view->height);
+    for (int i = 0; i < 4; ++i)
+        glClearNamedFramebufferfv(targets->framebuffer, GL_COLOR, i, zero);
+    glClearNamedFramebufferfv(targets->framebuffer, GL_DEPTH, 0, zero);
+    const struct gpu_draw stage = camera_draw(view, sample);
+    TRY(geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_CAMERA, 0));
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glBindTextureUnit(SLOT_GBUFFER_NORMAL, targets->normal.id);
+    glBindTextureUnit(SLOT_GBUFFER_DIFFUSE, targets->diffuse.id);
+    glBindTextureUnit(SLOT_GBUFFER_SPECULAR, targets->specular.id);
+    glBindTextureUnit(SLOT_GBUFFER_EMISSION, targets->emission.id);
+    return BRUME_OK;
+}
+
+brume_result view_shade(struct gpu *gpu, struct view_targets *targets, const brume_view *view)
+{
+    const struct program *program;
+    TRY(program_compute(&gpu->programs, "shade", &program));
+    glBindImageTexture(SLOT_OUTPUT, targets->surface.id, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+    program_dispatch(program, view->width, view->height, 1);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    return BRUME_OK;
+}
+
+brume_result view_march(struct gpu *gpu, struct view_targets *targets, const brume_view *view,
+                        struct gpu_frame *frame, struct buffer *frame_block,
+                        struct job_control *control)
+{
+    const struct program *program;
+    TRY(program_compute(&gpu->programs, "march", &program));
+    glBindTextureUnit(SLOT_SURFACE, targets->surface.id);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ACCUMULATION, targets->accumulation.id);
+    const int rows = gpu->context.info.software ? SOFTWARE_ROWS : view->height;
+    for (int y = 0; y < view->height; y += rows) {
+        const int end = y + rows < view->height ? y + rows : view->height;
+        if (job_cancelled(control))
+            return fail(BRUME_E_CANCELLED, "cancelled");
+        frame->march.z = (float)y;
+        frame->march.w = (float)end;
+        TRY(buffer_update(&gpu->memory, frame_block, FOR_TARGET, sizeof *frame, frame, "frame"));
+        program_dispatch(program, view->width, end - y, 1);
+        if (rows < view->height)
+            glFinish();
+    }
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    return BRUME_OK;
+}
+
+brume_result view_read(struct view_targets *targets, const brume_view *view, uint32_t pass,
+                       uint32_t samples, float *pixels)
+{
+    const size_t count = (size_t)view->width * (size_t)view->height;
+    const uint32_t slot = (uint32_t)__builtin_popcount(view->passes & ((1u << pass) - 1u));
+    const uint32_t channels = brume_pass_channels(pass);
+    float *sums = malloc(count * 4 * sizeof *sums);
+    if (!sums)
+        return fail(BRUME_E_MEMORY, "no memory to read %zu pixels", count);
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    glGetNamedBufferSubData(targets->accumulation.id,
+                            (GLintptr)(slot * count * VIEW_PASS_PIXEL_BYTES),
+                            (GLsizeiptr)(count * VIEW_PASS_PIXEL_BYTES), sums);
+    const float scale = pass == PASS_DEPTH ? 1.0f : 1.0f / (float)samples;
+    for (size_t i = 0; i < count; ++i)
+        for (uint32_t c = 0; c < channels; ++c)
+            pixels[i * channels + c] = sums[4 * i + c] * scale;
+    free(sums);
+    return BRUME_OK;
+}
+
+void view_finish(struct gpu *gpu, struct view_targets *targets)
+{
+    struct memory *memory = &gpu->memory;
+    texture_finish(memory, &targets->normal);
+    texture_finish(memory, &targets->diffuse);
+    texture_finish(memory, &targets->specular);
+    texture_finish(memory, &targets->emission);
+    texture_finish(memory, &targets->depth);
+    texture_finish(memory, &targets->surface);
+    buffer_finish(memory, &targets->accumulation);
+    if (targets->framebuffer)
+        glDeleteFramebuffers(1, &targets->framebuffer);
+    memset(targets, 0, sizeof *targets);
+}

@@ -1,0 +1,114 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Uploading the medium. */
+#include "transport/medium_textures.h"
+#include "base/result.h"
+#include "brume_gpu.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static int brick_count(int cells)
+{
+    return (cells + BRICK_CELLS - 1) / BRICK_CELLS;
+}
+
+static int clamp(int value, int low, int high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+/* A brick is 1 if any of its cells, or of the cells beside it that interpolation may reach, has
+ * extinction or emission. */
+static float *make_bricks(const struct medium_lattice *lattice, const int bricks[3])
+{
+    float *occupied = calloc((size_t)bricks[0] * (size_t)bricks[1] * (size_t)bricks[2],
+                             sizeof *occupied);
+    if (!occupied)
+        return NULL;
+    const int32_t *dims = lattice->dims;
+    size_t cell = 0;
+    for (int z = 0; z < dims[2]; ++z) {
+        for (int y = 0; y < dims[1]; ++y) {
+            for (int x = 0; x < dims[0]; ++x, ++cell) {
+                const float *extinct = lattice->extinct + 4 * cell;
+                const float *emission = lattice->emission ? lattice->emission + 4 * cell : extinct;
+                if (extinct[0] + extinct[1] + extinct[2] <= 0.0f &&
+                    emission[0] + emission[1] + emission[2] <= 0.0f)
+                    continue;
+                const int position[3] = {x, y, z};
+                int low[3], high[3];
+                for (int i = 0; i < 3; ++i) {
+                    low[i] = clamp(position[i] - 1, 0, dims[i] - 1) / BRICK_CELLS;
+                    high[i] = clamp(position[i] + 1, 0, dims[i] - 1) / BRICK_CELLS;
+                }
+                for (int k = low[2]; k <= high[2]; ++k)
+                    for (int j = low[1]; j <= high[1]; ++j)
+                        for (int i = low[0]; i <= high[0]; ++i)
+                            occupied[((size_t)k * (size_t)bricks[1] + (size_t)j) *
+                                         (size_t)bricks[0] +
+                                     (size_t)i] = 1.0f;
+            }
+        }
+    }
+    return occupied;
+}
+
+static brume_result fill(struct gpu *gpu, struct texture *texture, GLenum format,
+                         const int32_t dims[3], GLenum channels, const float *data,
+                         const char *label)
+{
+    TRY(texture_ensure(&gpu->memory, texture, FOR_MEDIUM, GL_TEXTURE_3D, format, dims[0], dims[1],
+                       dims[2], 1, label));
+    glTextureSubImage3D(texture->id, 0, 0, 0, 0, dims[0], dims[1], dims[2], channels, GL_FLOAT,
+                        data);
+    return BRUME_OK;
+}
+
+brume_result medium_textures_upload(struct gpu *gpu, struct medium_textures *textures,
+                                    const struct medium_lattice *lattice)
+{
+    memcpy(textures->dims, lattice->dims, sizeof textures->dims);
+    memcpy(textures->lower, lattice->lower, sizeof textures->lower);
+    memcpy(textures->upper, lattice->upper, sizeof textures->upper);
+    textures->cell = lattice->cell;
+    textures->emits = lattice->emission != NULL;
+    if (!lattice->emission)
+        texture_finish(&gpu->memory, &textures->emission);
+    if (lattice->dims[0] == 0) {
+        medium_textures_finish(gpu, textures);
+        return BRUME_OK;
+    }
+    TRY(fill(gpu, &textures->scatter, GL_RGBA16F, lattice->dims, GL_RGBA, lattice->scatter,
+             "medium scatter"));
+    TRY(fill(gpu, &textures->extinct, GL_RGBA16F, lattice->dims, GL_RGBA, lattice->extinct,
+             "medium extinction"));
+    if (lattice->emission)
+        TRY(fill(gpu, &textures->emission, GL_RGBA16F, lattice->dims, GL_RGBA, lattice->emission,
+                 "medium emission"));
+    const int bricks[3] = {brick_count(lattice->dims[0]), brick_count(lattice->dims[1]),
+                           brick_count(lattice->dims[2])};
+    float *occupied = make_bricks(lattice, bricks);
+    if (!occupied)
+        return fail(BRUME_E_MEMORY, "no memory for the medium's bricks");
+    const brume_result result =
+        fill(gpu, &textures->bricks, GL_R32F, bricks, GL_RED, occupied, "medium bricks");
+    free(occupied);
+    return result;
+}
+
+void medium_textures_bind(const struct medium_textures *textures)
+{
+    glBindTextureUnit(SLOT_MEDIUM_SCATTER, textures->scatter.id);
+    glBindTextureUnit(SLOT_MEDIUM_EXTINCT, textures->extinct.id);
+    glBindTextureUnit(SLOT_MEDIUM_EMISSION, textures->emission.id);
+    glBindTextureUnit(SLOT_MEDIUM_BRICKS, textures->bricks.id);
+}
+
+void medium_textures_finish(struct gpu *gpu, struct medium_textures *textures)
+{
+    texture_finish(&gpu->memory, &textures->scatter);
+    texture_finish(&gpu->memory, &textures->extinct);
+    texture_finish(&gpu->memory, &textures->emission);
+    texture_finish(&gpu->memory, &textures->bricks);
+    memset(textures, 0, sizeof *textures);
+}

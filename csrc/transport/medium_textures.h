@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The medium's lattice on the GPU, and its bricks for skipping empty space. Device thread. */
+#ifndef BRUME_TRANSPORT_MEDIUM_TEXTURES_H
+#define BRUME_TRANSPORT_MEDIUM_TEXTURES_H
+
+#include "gl/device.h"
+#include "scene/medium.h"
+
+struct medium_textures {
+    struct texture scatter, extinct, emission, bricks;
+    int32_t dims[3]; /* 0 without media */
+    float lower[3], upper[3], cell;
+    int emits;
+};
+
+/* Bytes of a cell on the GPU: scatter and extinction, and emission where there is one, as halves,
+ * and its part of a brick. */
+#define MEDIUM_CELL_BYTES 25
+
+brume_result medium_textures_upload(struct gpu *gpu, struct medium_textures *textures,
+                                    const struct medium_lattice *lattice);
+void medium_textures_bind(const struct medium_textures *textures);
+void medium_textures_finish(struct gpu *gpu, struct medium_textures *textures);
+
+#endif

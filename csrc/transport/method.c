@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The table of methods. */
+#include "transport/method.h"
+
+static const struct method methods[BRUME_METHOD_COUNT] = {
+    [BRUME_METHOD_OPV] = {"OPV", opv_run},
+};
+
+const struct method *method_find(uint32_t number)
+{
+    return number < BRUME_METHOD_COUNT ? &methods[number] : NULL;
+}
+
+void transport_bind(const struct transport *transport)
+{
+    glBindTextureUnit(SLOT_TAU, transport->tau.id);
+    glBindTextureUnit(SLOT_SKY_R, transport->sky[0].id);
+    glBindTextureUnit(SLOT_SKY_G, transport->sky[1].id);
+    glBindTextureUnit(SLOT_SKY_B, transport->sky[2].id);
+}
+
+void transport_finish(struct gpu *gpu, struct transport *transport)
+{
+    texture_finish(&gpu->memory, &transport->tau);
+    for (int i = 0; i < 3; ++i)
+        texture_finish(&gpu->memory, &transport->sky[i]);
+}

@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* The seam for methods of transport: a method is one C file, its shaders, and one line in
+ * method.c. A method fills the product below from the medium, the lights and their shadow maps,
+ * which are bound when it runs. Device thread. */
+#ifndef BRUME_TRANSPORT_METHOD_H
+#define BRUME_TRANSPORT_METHOD_H
+
+#include "base/job.h"
+#include "brume_gpu.h"
+#include "gl/device.h"
+#include "transport/medium_textures.h"
+
+/* What the view takes light from. */
+struct transport {
+    struct texture tau;    /* optical depth to each light, a tile a light */
+    struct texture sky[3]; /* the world's light, spherical harmonics a colour */
+};
+
+struct transport_input {
+    struct gpu *gpu;
+    const struct medium_textures *medium;
+    const brume_settings *settings;
+    struct job_control *control;
+    const struct gpu_frame *frame;  /* lattices are laid out in it, and bound */
+    const struct gpu_light *lights; /* tiles are laid out in them, and bound */
+    uint32_t light_count;
+    int tau_size[3];                /* texels of the optical depths' texture, 0: none wanted */
+};
+
+struct method {
+    const char *id;
+    brume_result (*run)(struct transport *transport, const struct transport_input *input);
+};
+
+/* NULL for an unknown number. */
+const struct method *method_find(uint32_t number);
+void transport_bind(const struct transport *transport);
+void transport_finish(struct gpu *gpu, struct transport *transport);
+
+/* The methods. */
+brume_result opv_run(struct transport *transport, const struct transport_input *input);
+
+#endif

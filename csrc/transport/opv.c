@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* OPV: single scattering through one optical depth a cell and light. "Real-time single scattering
+ * in heterogeneous media by opacity propagation volumes"; docs/methods/opv.md. The depths (its
+ * equation 4) are marched exactly for now; the world's light goes into a lattice of its own. */
+#include "base/result.h"
+#include "transport/method.h"
+
+#include <math.h>
+
+/* Samples whose transmittances are averaged for a light with extent; at most 8 (opv_tau). */
+#define EXTENDED_SAMPLES 4
+
+static uint32_t depth_samples(const struct gpu_light *light, float cell)
+{
+    int extended;
+    switch (light->info.x) {
+    case LIGHT_SUN:
+        extended = light->axis.w > 0.02f;
+        break;
+    case LIGHT_POINT:
+    case LIGHT_SPOT:
+        extended = light->position.w > cell;
+        break;
+    default:
+        extended = light->radiance.w > cell * cell;
+        break;
+    }
+    if (!extended)
+        return 1;
+    return light->samples.y < EXTENDED_SAMPLES ? light->samples.y : EXTENDED_SAMPLES;
+}
+
+/* Runs a lattice program in slabs, so that a cancel need not wait for the whole lattice. */
+static brume_result run_slabs(const struct transport_input *input, const struct program *program,
+                              struct gpu_lattice_pass pass, const ivec4 *dims, float progress)
+{
+    /* A GPU takes the lattice whole; a CPU takes about a tenth of a second a slab. */
+    const int slab = input->gpu->context.info.software ? 2 * GROUP_CELLS : dims->z;
+    brume_result result = BRUME_OK;
+    struct buffer block = {0};
+    for (int z = 0; z < dims->z && result == BRUME_OK; z += slab) {
+        if (job_cancelled(input->control))
+            result = fail(BRUME_E_CANCELLED, "cancelled");
+        pass.slab.z = z;
+        pass.slab.w = z + slab < dims->z ? z + slab : dims->z;
+        if (result == BRUME_OK)
+            result = buffer_update(&input->gpu->memory, &block, FOR_TRANSPORT, sizeof pass, &pass,
+                                   "lattice pass");
+        if (result == BRUME_OK) {
+            glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_STAGE, block.id);
+            program_dispatch(program, dims->x, dims->y, pass.slab.w - z);
+            if (slab < dims->z)
+                glFinish();
+        }
+    }
+    buffer_finish(&input->gpu->memory, &block);
+    job_report(input->control, BRUME_STAGE_TRANSPORT, progress);
+    return result;
+}
+
+static brume_result run_tau(struct transport *transport, const struct transport_input *input)
+{
+    const struct program *program;
+    TRY(program_compute(&input->gpu->programs, "opv_tau", &program));
+    TRY(texture_ensure(&input->gpu->memory, &transport->tau, FOR_TRANSPORT, GL_TEXTURE_3D,
+                       GL_RGBA16F, input->tau_size[0], input->tau_size[1], input->tau_size[2], 1,
+                       "optical depth"));
+    glBindImageTexture(SLOT_OUTPUT, transport->tau.id, 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA16F);
+    for (uint32_t i = 0; i < input->light_count; ++i) {
+        const struct gpu_light *light = &input->lights[i];
+        if (!light->info.w)
+            continue;
+        const struct gpu_lattice_pass pass = {
+            .offset = {(int)i, (int)depth_samples(light, input->frame->lattice_lower.w),
+                       (int)light->info.y, (int)light->info.z}};
+        TRY(run_slabs(input, program, pass, &input->frame->lattice_dims,
+                      0.1f + 0.1f * (float)(i + 1) / (float)input->light_count));
+    }
+    return BRUME_OK;
+}
+
+static brume_result run_sky(struct transport *transport, const struct transport_input *input)
+{
+    static const char *const labels[] = {"sky red", "sky green", "sky blue"};
+    const struct program *program;
+    const ivec4 *dims = &input->frame->sky_dims;
+    TRY(program_compute(&input->gpu->programs, "opv_sky", &program));
+    for (int i = 0; i < 3; ++i) {
+        TRY(texture_ensure(&input->gpu->memory, &transport->sky[i], FOR_TRANSPORT, GL_TEXTURE_3D,
+                           GL_RGBA16F, dims->x, dims->y, dims->z, 1, labels[i]));
+        glBindImageTexture((GLuint)(SLOT_OUTPUT + i), transport->sky[i].id, 0, GL_TRUE, 0,
+                           GL_WRITE_ONLY, GL_RGBA16F);
+    }
+    const struct gpu_lattice_pass pass = {0};
+    return run_slabs(input, program, pass, dims, 0.25f);
+}
+
+brume_result opv_run(struct transport *transport, const struct transport_input *input)
+{
+    if (input->tau_size[0] > 0)
+        TRY(run_tau(transport, input));
+    else
+        texture_finish(&input->gpu->memory, &transport->tau);
+    if (input->frame->sky_dims.w)
+        TRY(run_sky(transport, input));
+    else
+        for (int i = 0; i < 3; ++i)
+            texture_finish(&input->gpu->memory, &transport->sky[i]);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    return BRUME_OK;
+}

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The frame's block, rays of a pixel, and the random numbers of a sample.
+#include "shared/brume_gpu.h"
+
+const float PI = 3.14159265358979;
+
+layout(std140, binding = SLOT_FRAME) uniform frame_block
+{
+    gpu_frame frame;
+};
+
+// PCG hash, Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 2020.
+uint hash(uint x)
+{
+    uint state = x * 747796405u + 2891336453u;
+    uint word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return (word >> 22u) ^ word;
+}
+
+uint pixel_hash(ivec2 pixel, uint stream)
+{
+    return hash(uint(pixel.x) + hash(uint(pixel.y) + hash(stream + uint(frame.size.w) * 977u)));
+}
+
+// Stratified over a pixel's samples: a golden-ratio sequence with its own start at each pixel.
+float pixel_random(ivec2 pixel, uint stream)
+{
+    float start = float(pixel_hash(pixel, stream)) * (1.0 / 4294967296.0);
+    return fract(start + float(frame.size.z) * 0.618033988749895);
+}
+
+struct view_ray
+{
+    vec3 origin;
+    vec3 direction; // unit
+    float stretch;  // distance along the ray per unit of view depth
+};
+
+view_ray pixel_ray(ivec2 pixel)
+{
+    vec2 ndc = (vec2(pixel) + 0.5) / vec2(frame.size.xy) * 2.0 - 1.0;
+    view_ray ray;
+    ray.origin = frame.ray_origin.xyz + ndc.x * frame.ray_origin_x.xyz +
+                 ndc.y * frame.ray_origin_y.xyz;
+    vec3 d = frame.ray_direction.xyz + ndc.x * frame.ray_direction_x.xyz +
+             ndc.y * frame.ray_direction_y.xyz;
+    ray.stretch = length(d);
+    ray.direction = d / ray.stretch;
+    return ray;
+}
+
+// Where a ray is inside a box: x enter, y leave; empty where x >= y.
+vec2 ray_box(vec3 origin, vec3 direction, vec3 lower, vec3 upper)
+{
+    // A zero component gives infinities of the right signs, but 0 * inf is NaN: keep off zero.
+    vec3 d = mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
+    vec3 a = (lower - origin) / d;
+    vec3 b = (upper - origin) / d;
+    vec3 near = min(a, b);
+    vec3 far = max(a, b);
+    return vec2(max(max(near.x, near.y), near.z), min(min(far.x, far.y), far.z));
+}
+
+float luminance(vec3 rgb)
+{
+    return dot(rgb, vec3(0.2126, 0.7152, 0.0722));
+}

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Materials and the alpha test of the drawing stages.
+#include "shared/brume_gpu.h"
+
+layout(std430, binding = SLOT_MATERIALS) readonly buffer materials_block
+{
+    gpu_material materials[];
+};
+
+layout(binding = SLOT_MATERIAL_BASE) uniform sampler2D base_image;
+layout(binding = SLOT_MATERIAL_ROUGHNESS) uniform sampler2D roughness_image;
+
+vec4 material_base(gpu_material material, vec2 uv)
+{
+    if ((material.flags.x & MATERIAL_BASE_IMAGE) == 0u)
+        return vec4(1.0);
+    if ((material.flags.x & MATERIAL_CLIP_IMAGE) != 0u &&
+        (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))))
+        return vec4(0.0);
+    return texture(base_image, uv);
+}
+
+float material_alpha(gpu_material material, vec4 base)
+{
+    return material.specular.w *
+           ((material.flags.x & MATERIAL_ALPHA_IMAGE) != 0u ? base.a : 1.0);
+}
+
+// PCG, as in lib/frame.glsl.
+uint alpha_hash(uint x)
+{
+    uint state = x * 747796405u + 2891336453u;
+    uint word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return (word >> 22u) ^ word;
+}
+
+// False where this sample sees through the surface. Blending is coverage, drawn by lot for every
+// pixel, surface and sample, so that the mean over the samples is exact in any order of surfaces.
+bool material_covers(gpu_material material, float alpha, vec2 pixel, uint surface, uint seed)
+{
+    if ((material.flags.x & MATERIAL_ALPHA_CLIP) != 0u)
+        return alpha >= material.metal.w;
+    if ((material.flags.x & MATERIAL_ALPHA_BLEND) == 0u)
+        return true;
+    uint start = alpha_hash(uint(pixel.x) + alpha_hash(uint(pixel.y) + alpha_hash(surface)));
+    float lot = fract(float(start) * (1.0 / 4294967296.0) + float(seed) * 0.618033988749895);
+    return lot < alpha;
+}

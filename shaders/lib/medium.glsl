@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The media: the lattice of all volumes, and the world's homogeneous medium, kept analytic.
+#include "lib/frame.glsl"
+
+layout(binding = SLOT_MEDIUM_SCATTER) uniform sampler3D medium_scatter;   // sigma_s, mean cosine
+layout(binding = SLOT_MEDIUM_EXTINCT) uniform sampler3D medium_extinct;   // sigma_t
+layout(binding = SLOT_MEDIUM_EMISSION) uniform sampler3D medium_emission;
+layout(binding = SLOT_MEDIUM_BRICKS) uniform sampler3D medium_bricks;     // 0: nothing in the brick
+
+bool medium_exists()
+{
+    return frame.medium_dims.w != 0;
+}
+
+vec3 medium_coordinate(vec3 p)
+{
+    return (p - frame.medium_lower.xyz) / (frame.medium_lower.w * vec3(frame.medium_dims.xyz));
+}
+
+// Distance along the direction to the end of an empty brick, 0 where the brick has something.
+float medium_skip(vec3 p, vec3 direction)
+{
+    float side = frame.medium_lower.w * float(BRICK_CELLS);
+    vec3 q = (p - frame.medium_lower.xyz) / side;
+    ivec3 last = textureSize(medium_bricks, 0) - 1;
+    ivec3 brick = clamp(ivec3(floor(q)), ivec3(0), last);
+    if (texelFetch(medium_bricks, brick, 0).r > 0.0)
+        return 0.0;
+    vec3 d = mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
+    vec3 t = (vec3(brick) + step(0.0, d) - q) * side / d;
+    return max(min(t.x, min(t.y, t.z)), 0.0);
+}
+
+// Optical depth of the lattice from the origin along a unit direction; midpoint rule, exact where
+// the medium is homogeneous.
+vec3 medium_tau(vec3 origin, vec3 direction, float t_max, float step_length)
+{
+    vec2 span = ray_box(origin, direction, frame.medium_lower.xyz, frame.medium_upper.xyz);
+    float t0 = max(span.x, 0.0);
+    float t1 = min(span.y, t_max);
+    vec3 tau = vec3(0.0);
+    if (t0 >= t1)
+        return tau;
+    int count = max(int(ceil((t1 - t0) / step_length)), 1);
+    float dt = (t1 - t0) / float(count);
+    for (int k = 0; k < count; ++k) {
+        vec3 p = origin + direction * (t0 + (float(k) + 0.5) * dt);
+        float skip = medium_skip(p, direction);
+        if (skip > 0.0)
+            k += int(skip / dt);
+        else
+            tau += textureLod(medium_extinct, medium_coordinate(p), 0.0).rgb * dt;
+    }
+    return tau;
+}
+
+bool fog_exists()
+{
+    return frame.fog_lower.w != 0.0;
+}
+
+// Optical depth of the world's medium from the origin along a unit direction.
+vec3 fog_tau(vec3 origin, vec3 direction, float t_max)
+{
+    if (!fog_exists())
+        return vec3(0.0);
+    vec2 span = ray_box(origin, direction, frame.fog_lower.xyz, frame.fog_upper.xyz);
+    float length_inside = max(min(span.y, t_max) - max(span.x, 0.0), 0.0);
+    return frame.fog_sigma_t.rgb * length_inside;
+}

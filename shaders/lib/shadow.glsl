@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Looking into the shadow maps: reversed depth, 0 where nothing was drawn.
+#include "lib/light.glsl"
+
+layout(binding = SLOT_SHADOW) uniform sampler2DArray shadow_maps;
+
+layout(std430, binding = SLOT_SHADOW_VIEWS) readonly buffer shadow_views_block
+{
+    gpu_shadow_view shadow_views[];
+};
+
+// Distance of the occluder that a texel of the map holds.
+float shadow_distance(gpu_shadow_view view, float depth)
+{
+    if (view.range.x != 0.0)
+        return depth > 0.0 ? view.range.z - depth * (view.range.z - view.range.y) : 1e30;
+    return view.range.y / max(depth, 1e-30);
+}
+
+// The share of a light sample that geometry lets through to p: one texel (soft false) or a
+// bilinear comparison of four.
+float shadow_layer(int layer, vec3 p, float bias, bool soft)
+{
+    gpu_shadow_view view = shadow_views[layer];
+    vec4 clip = view.clip_from_world * vec4(p, 1.0);
+    if (clip.w <= 0.0)
+        return 1.0;
+    vec2 uv = clip.xy / clip.w * 0.5 + 0.5;
+    if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0))))
+        return 1.0;
+    float distance_here = view.range.x != 0.0
+                              ? view.range.z - clip.z * (view.range.z - view.range.y)
+                              : clip.w;
+    distance_here -= bias;
+    float side = float(frame.counts.y);
+    if (!soft) {
+        ivec2 texel = min(ivec2(uv * side), ivec2(side) - 1);
+        float depth = texelFetch(shadow_maps, ivec3(texel, layer), 0).r;
+        return shadow_distance(view, depth) < distance_here ? 0.0 : 1.0;
+    }
+    vec4 depths = textureGather(shadow_maps, vec3(uv, float(layer)));
+    vec4 lit;
+    for (int i = 0; i < 4; ++i)
+        lit[i] = shadow_distance(view, depths[i]) < distance_here ? 0.0 : 1.0;
+    vec2 f = fract(uv * side - 0.5);
+    return mix(mix(lit.w, lit.z, f.x), mix(lit.x, lit.y, f.x), f.y);
+}
+
+// The layer that sees along v (from the light), by the light's faces.
+int shadow_face(gpu_light light, vec3 v)
+{
+    if (light.samples.z == 1u)
+        return 0;
+    vec3 forward = light.axis.xyz;
+    // Same frame as frame_around() of csrc/math/frame.cpp.
+    float s = forward.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + forward.z);
+    float b = forward.x * forward.y * a;
+    vec3 u = vec3(1.0 + s * forward.x * forward.x * a, s * b, -s * forward.x);
+    vec3 w = vec3(b, s + forward.y * forward.y * a, -forward.y);
+    vec3 q = vec3(dot(v, u), dot(v, w), dot(v, forward));
+    vec3 m = abs(q);
+    if (m.z >= m.x && m.z >= m.y)
+        return q.z > 0.0 ? 0 : 5;
+    if (m.x >= m.y)
+        return q.x > 0.0 ? 1 : 2;
+    return q.y > 0.0 ? 3 : 4;
+}
+
+// A surface passes its normal and moves the look-up off itself by the texel's size; p in a medium
+// passes zero.
+float light_shadow(gpu_light light, gpu_light_sample s, vec3 p, vec3 normal, bool soft)
+{
+    if (s.position.w < 0.0)
+        return 1.0;
+    int layer = int(s.position.w);
+    float texel;
+    vec3 v = light.info.x == uint(LIGHT_SUN) ? -s.position.xyz : p - s.position.xyz;
+    if (light.info.x != uint(LIGHT_SUN)) {
+        int face = shadow_face(light, v);
+        if (face >= int(light.samples.z))
+            return 1.0; // behind an area light, which sends nothing there
+        layer += face;
+        texel = shadow_views[layer].range.w * length(v);
+    } else {
+        texel = shadow_views[layer].range.w;
+    }
+    // The slope's share of the bias is bounded: at grazing light the offset along the normal does
+    // the rest.
+    float cosine = clamp(dot(normal, -normalize(v)), 0.05, 1.0);
+    float slope = min(sqrt(1.0 - cosine * cosine) / cosine, 4.0);
+    float on_surface = dot(normal, normal) > 0.0 ? 1.0 : 0.0;
+    return shadow_layer(layer, p + normal * texel, on_surface * texel * (0.5 + 0.5 * slope), soft);
+}
+
+float world_shadow(gpu_light_sample s, vec3 p, vec3 normal, bool soft)
+{
+    if (s.position.w < 0.0)
+        return 1.0;
+    int layer = int(s.position.w);
+    float texel = shadow_views[layer].range.w;
+    float cosine = clamp(dot(normal, s.position.xyz), 0.05, 1.0);
+    float slope = min(sqrt(1.0 - cosine * cosine) / cosine, 4.0);
+    float on_surface = dot(normal, normal) > 0.0 ? 1.0 : 0.0;
+    return shadow_layer(layer, p + normal * texel, on_surface * texel * (0.5 + 0.5 * slope), soft);
+}

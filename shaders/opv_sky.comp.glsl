@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The world's uncollided light at every node of its lattice, as spherical harmonics of bands 0 and
+// 1 per colour: the sum over the world's samples of radiance * solid angle * transmittance.
+#version 450 core
+#include "lib/medium.glsl"
+#include "lib/shadow.glsl"
+
+layout(local_size_x = GROUP_CELLS, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
+
+layout(std140, binding = SLOT_STAGE) uniform stage_block
+{
+    gpu_lattice_pass stage;
+};
+
+layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D sky_image[3];
+
+void main()
+{
+    ivec3 node = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
+    if (any(greaterThanEqual(node, frame.sky_dims.xyz)) || node.z >= stage.slab.w)
+        return;
+    vec3 p = frame.sky_lower.xyz + vec3(node) * frame.sky_lower.w;
+    float step_length = 2.0 * frame.medium_lower.w;
+    vec4 red = vec4(0.0), green = vec4(0.0), blue = vec4(0.0);
+    for (uint i = 0u; i < frame.world.y; ++i) {
+        gpu_light_sample s = light_samples[frame.world.x + i];
+        vec3 towards = s.position.xyz;
+        float lit = world_shadow(s, p, vec3(0.0), false);
+        if (lit == 0.0)
+            continue;
+        vec3 tau = fog_tau(p, towards, 1e30);
+        if (medium_exists())
+            tau += medium_tau(p, towards, 1e30, step_length);
+        vec3 light = s.weight.rgb * exp(-tau) * lit;
+        // Y_0 = sqrt(1 / 4 pi), Y_1 = sqrt(3 / 4 pi) (y, z, x); kept as mean and flux vector:
+        // the constants are put back in sky_scatter().
+        vec4 basis = vec4(1.0, -towards);
+        red += light.r * basis;
+        green += light.g * basis;
+        blue += light.b * basis;
+    }
+    imageStore(sky_image[0], node, red);
+    imageStore(sky_image[1], node, green);
+    imageStore(sky_image[2], node, blue);
+}

@@ -1,0 +1,165 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What C and GLSL share: structs, group sizes, slots. Only float int uint vec4 ivec4 uvec4 mat4,
+ * padded by hand; sizes are asserted in C (render/layout.c). */
+#ifndef BRUME_GPU_H
+#define BRUME_GPU_H
+
+#ifndef GL_core_profile
+#include <stdint.h>
+typedef uint32_t uint;
+typedef struct vec4 { float x, y, z, w; } vec4;
+typedef struct ivec4 { int x, y, z, w; } ivec4;
+typedef struct uvec4 { uint32_t x, y, z, w; } uvec4;
+typedef struct mat4 { float m[16]; } mat4;
+#endif
+
+/* Group sizes */
+#define GROUP_PIXELS 8   /* 8 x 8 x 1: a view pass */
+#define GROUP_CELLS 4    /* 4 x 4 x 4: a lattice pass */
+
+/* Uniform blocks */
+#define SLOT_FRAME 0
+#define SLOT_STAGE 1
+
+/* Storage buffers */
+#define SLOT_LIGHTS 0
+#define SLOT_LIGHT_SAMPLES 1
+#define SLOT_SHADOW_VIEWS 2
+#define SLOT_MATERIALS 3
+#define SLOT_INSTANCES 4
+#define SLOT_ACCUMULATION 5
+
+/* Textures */
+#define SLOT_MEDIUM_SCATTER 0
+#define SLOT_MEDIUM_EXTINCT 1
+#define SLOT_MEDIUM_EMISSION 2
+#define SLOT_MEDIUM_BRICKS 3
+#define SLOT_TAU 4
+#define SLOT_SKY_R 5
+#define SLOT_SKY_G 6
+#define SLOT_SKY_B 7
+#define SLOT_SHADOW 8
+#define SLOT_WORLD 9
+#define SLOT_GBUFFER_NORMAL 10
+#define SLOT_GBUFFER_DIFFUSE 11
+#define SLOT_GBUFFER_SPECULAR 12
+#define SLOT_GBUFFER_EMISSION 13
+#define SLOT_SURFACE 14
+#define SLOT_MATERIAL_BASE 15
+#define SLOT_MATERIAL_ROUGHNESS 16
+#define SLOT_GBUFFER_TINT 17
+
+/* Images written by compute passes */
+#define SLOT_OUTPUT 0
+
+/* Cells along a brick's side: the unit of empty-space skipping. */
+#define BRICK_CELLS 8
+
+/* Lights, numbered as brume_light_type of brume.h; the world is one more. */
+#define LIGHT_SUN 0
+#define LIGHT_POINT 1
+#define LIGHT_SPOT 2
+#define LIGHT_RECTANGLE 3
+#define LIGHT_ELLIPSE 4
+
+#define LIGHT_CASTS_SHADOW 1u
+#define LIGHT_CAMERA_VISIBLE 2u
+
+struct gpu_light {
+    vec4 position;   /* centre; sun: unit vector towards it. w: radius (point, spot) */
+    vec4 axis;       /* unit vector that it shines along. w: tan of half the sun's angle */
+    vec4 tangent;    /* area: half extent along u. spot: unit x over its scale. w: spot cos */
+    vec4 bitangent;  /* area: half extent along v. spot: unit y over its scale. w: spot smooth */
+    vec4 radiance;   /* sun: irradiance; point, spot: W/sr; area: W/(sr m^2). w: area, m^2 */
+    vec4 factors;    /* diffuse, specular, volume; w: tan of half the spread, 0: none */
+    uvec4 samples;   /* first sample, count, faces a sample, LIGHT_ flags */
+    uvec4 info;      /* type; tile origin of its optical depth (y, z); 1 if it has one */
+};
+
+struct gpu_light_sample {
+    vec4 position;   /* point on the light; sun and world: unit vector towards it.
+                        w: first shadow layer, -1: none */
+    vec4 weight;     /* world: radiance times solid angle; else 1 / count. w: unused */
+};
+
+/* One layer of the shadow maps. */
+struct gpu_shadow_view {
+    mat4 clip_from_world;
+    vec4 range;      /* x: 0 perspective, 1 orthographic; y near; z far; w: texel's size, m at
+                        distance 1 (perspective) or anywhere (orthographic) */
+};
+
+#define MATERIAL_BASE_IMAGE 1u
+#define MATERIAL_ROUGHNESS_IMAGE 2u
+#define MATERIAL_ALPHA_CLIP 4u
+#define MATERIAL_ALPHA_BLEND 8u
+#define MATERIAL_ALPHA_IMAGE 16u
+#define MATERIAL_CULL_BACK 32u
+#define MATERIAL_CLIP_IMAGE 64u  /* transparent black outside the image */
+
+struct gpu_material {
+    vec4 diffuse;      /* w: roughness */
+    vec4 specular;     /* w: alpha */
+    vec4 metal;        /* w: alpha threshold */
+    vec4 emission;
+    vec4 transparent;
+    uvec4 flags;
+};
+
+struct gpu_instance {
+    mat4 world_from_object;
+    mat4 normal_from_object; /* inverse transpose */
+    uvec4 flags;             /* brume_visibility bits */
+};
+
+/* The drawing stages' block: one shadow layer, or the camera. */
+struct gpu_draw {
+    mat4 clip_from_world;
+    vec4 clip;           /* near, far along the view; z: 1 orthographic */
+    vec4 eye;            /* camera position, or the direction it looks along; w: 0 direction */
+    uvec4 info;          /* x: seed of the alpha test */
+};
+
+/* The lattice stages' block. */
+struct gpu_lattice_pass {
+    ivec4 offset;        /* x: first light or world sample; y: count; z, w: tile origin (y, z) */
+    ivec4 slab;          /* z: first node layer of this dispatch */
+};
+
+/* Passes as brume_pass of brume.h. */
+#define PASS_COMBINED 0
+#define PASS_DEPTH 1
+#define PASS_NORMAL 2
+#define PASS_VOLUME_DIRECT 3
+#define PASS_EMISSION 4
+#define PASS_ENVIRONMENT 5
+#define PASS_TRANSMITTANCE 6
+#define PASS_COUNT 7
+
+struct gpu_frame {
+    mat4 view_from_world;
+    vec4 ray_origin, ray_origin_x, ray_origin_y; /* ray = origin + x ndc.x + y ndc.y */
+    vec4 ray_direction, ray_direction_x, ray_direction_y; /* view depth 1 per unit */
+    ivec4 size;          /* width, height, number of this sample, seed */
+    vec4 clip;           /* near, far, film transparent, samples in all */
+    vec4 medium_lower;   /* w: cell, m */
+    vec4 medium_upper;   /* w: 1 if it emits */
+    ivec4 medium_dims;   /* w: 1 if there is one */
+    vec4 lattice_lower;  /* transport lattice; w: cell, m */
+    ivec4 lattice_dims;  /* nodes along the sides; w: 1 if there is one */
+    vec4 sky_lower;      /* lattice of the world's light; w: cell, m */
+    ivec4 sky_dims;      /* nodes along the sides; w: 1 if there is one */
+    vec4 fog_lower;      /* the world's medium; w: 1 if there is one */
+    vec4 fog_upper;      /* w: 1 if it reaches without limit */
+    vec4 fog_sigma_s;    /* w: mean cosine */
+    vec4 fog_sigma_t;
+    vec4 fog_emission;
+    vec4 world_color;    /* w: 1 if there is an image */
+    mat4 image_from_world;
+    uvec4 world;         /* first sample, count, samples a pixel takes each time */
+    uvec4 counts;        /* lights; shadow maps' side */
+    vec4 march;          /* step, m; steps in fog alone; rows of this dispatch: first, end */
+    ivec4 pass_slots[2]; /* slot of each pass in the accumulation buffer, -1: not wanted */
+};
+
+#endif

@@ -13,7 +13,7 @@
 enum { ALL_POINTS = 1 << 25, CELL_POINTS = 27 };
 
 /* So many points per averaged voxel and axis let turned tents still sum to nearly 1. */
-#define DENSITY 1.5f
+#define DENSITY 1.2f
 
 /* Axes count as parallel if they drift apart by less than this over the lattice, in voxels. */
 #define DRIFT 0.01f
@@ -239,38 +239,74 @@ static brume_result reduce(struct resampler *r)
     return BRUME_OK;
 }
 
-/* Adds the trilinear value at a point in units of reduced voxels; 0 beyond the box. */
+/* The voxels around a point in units of reduced voxels: the lowest, and how far from its centre the
+ * point is. false where all are beyond the box, and 0. */
+static inline bool find_voxels(const int32_t dims[3], const float point[3], int32_t low[3],
+                               float part[3])
+{
+    for (int axis = 0; axis < 3; ++axis) {
+        const float from_centre = point[axis] - 0.5f;
+        if (!(from_centre > -1.0f && from_centre < (float)dims[axis]))
+            return false;
+        low[axis] = (int32_t)(from_centre + 1.0f) - 1; /* floor of what is above -1 */
+        part[axis] = from_centre - (float)low[axis];
+    }
+    return true;
+}
+
+static inline float mix(float a, float b, float part)
+{
+    return a + (b - a) * part;
+}
+
+/* The trilinear value among eight voxels, all in the box. */
+static inline float look_up(const float *voxel, size_t step_x, size_t step_y, size_t step_z,
+                            const float part[3])
+{
+    const float *above = voxel + step_z;
+    const float low = mix(mix(voxel[0], voxel[step_x], part[0]),
+                          mix(voxel[step_y], voxel[step_y + step_x], part[0]), part[1]);
+    const float high = mix(mix(above[0], above[step_x], part[0]),
+                           mix(above[step_y], above[step_y + step_x], part[0]), part[1]);
+    return mix(low, high, part[2]);
+}
+
+/* The same where some of the eight are beyond the box. */
+static void add_border(const float *data, const int32_t dims[3], int32_t channels,
+                       const int32_t low[3], const float part[3], float sum[3])
+{
+    for (int corner = 0; corner < 8; ++corner) {
+        size_t voxel = 0;
+        float weight = 1.0f;
+        for (int axis = 2; axis >= 0; --axis) {
+            const int32_t high = corner >> axis & 1, at = low[axis] + high;
+            weight *= at < 0 || at >= dims[axis] ? 0.0f : high ? part[axis] : 1.0f - part[axis];
+            voxel = voxel * (size_t)dims[axis] + (size_t)at;
+        }
+        if (weight > 0.0f)
+            for (int32_t c = 0; c < channels; ++c)
+                sum[c] += weight * data[voxel * (size_t)channels + (size_t)c];
+    }
+}
+
 static inline void add_point(const float *data, const int32_t dims[3], int32_t channels,
                              const float point[3], float sum[3])
 {
     int32_t low[3];
-    float part[3][2];
-    for (int axis = 0; axis < 3; ++axis) {
-        const float from_centre = point[axis] - 0.5f;
-        if (!(from_centre > -1.0f && from_centre < (float)dims[axis]))
-            return;
-        low[axis] = (int32_t)(from_centre + 1.0f) - 1; /* floor of what is above -1 */
-        part[axis][1] = from_centre - (float)low[axis];
-        part[axis][0] = 1.0f - part[axis][1];
+    float part[3];
+    if (!find_voxels(dims, point, low, part))
+        return;
+    if (low[0] < 0 || low[1] < 0 || low[2] < 0 || low[0] + 1 >= dims[0] || low[1] + 1 >= dims[1] ||
+        low[2] + 1 >= dims[2]) {
+        add_border(data, dims, channels, low, part, sum);
+        return;
     }
-    for (int32_t z = 0; z < 2; ++z) {
-        if (low[2] + z < 0 || low[2] + z >= dims[2])
-            continue;
-        for (int32_t y = 0; y < 2; ++y) {
-            if (low[1] + y < 0 || low[1] + y >= dims[1])
-                continue;
-            const size_t row =
-                ((size_t)(low[2] + z) * (size_t)dims[1] + (size_t)(low[1] + y)) * (size_t)dims[0];
-            const float weight = part[2][z] * part[1][y];
-            for (int32_t x = 0; x < 2; ++x) {
-                if (low[0] + x < 0 || low[0] + x >= dims[0])
-                    continue;
-                const float *voxel = data + (row + (size_t)(low[0] + x)) * (size_t)channels;
-                for (int32_t c = 0; c < channels; ++c)
-                    sum[c] += weight * part[0][x] * voxel[c];
-            }
-        }
-    }
+    const size_t step_x = (size_t)channels, step_y = step_x * (size_t)dims[0],
+                 step_z = step_y * (size_t)dims[1];
+    const float *voxel =
+        data + (size_t)low[2] * step_z + (size_t)low[1] * step_y + (size_t)low[0] * step_x;
+    for (int32_t c = 0; c < channels; ++c)
+        sum[c] += look_up(voxel + c, step_x, step_y, step_z, part);
 }
 
 /* Points spread over the part of the cell that lies in the support's lattice bounds, however small
@@ -279,7 +315,6 @@ static void any_cell(const struct resampler *r, const int32_t cell[3], float mea
                      float *inside)
 {
     const float *data = r->reduced ? r->reduced : r->field->data;
-    const double scale = 1.0 / r->reduction;
     double low[3], step[3], part = 1.0;
     int32_t points[3];
     for (int lattice = 0; lattice < 3; ++lattice) {
@@ -296,21 +331,31 @@ static void any_cell(const struct resampler *r, const int32_t cell[3], float mea
     if (part <= 0.0)
         return;
 
+    /* In units of averaged voxels: the first point, and the way to the next along each axis. */
+    const float *m = r->array_from_lattice;
+    const double scale = 1.0 / r->reduction;
+    float first[3], next[3][3], lower[3], upper[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        double at = m[12 + axis];
+        for (int lattice = 0; lattice < 3; ++lattice) {
+            at += m[4 * lattice + axis] * (low[lattice] + 0.5 * step[lattice]);
+            next[lattice][axis] = (float)(m[4 * lattice + axis] * step[lattice] * scale);
+        }
+        first[axis] = (float)(at * scale);
+        lower[axis] = (float)(r->lower[axis] * scale);
+        upper[axis] = (float)(r->upper[axis] * scale);
+    }
     float sum[3] = {0.0f, 0.0f, 0.0f};
     int32_t seen = 0;
     for (int32_t z = 0; z < points[2]; ++z)
         for (int32_t y = 0; y < points[1]; ++y)
             for (int32_t x = 0; x < points[0]; ++x) {
-                const double at[3] = {low[0] + (x + 0.5) * step[0], low[1] + (y + 0.5) * step[1],
-                                      low[2] + (z + 0.5) * step[2]};
-                const float *m = r->array_from_lattice;
                 float point[3];
                 bool in = true;
                 for (int axis = 0; axis < 3; ++axis) {
-                    const double array =
-                        m[axis] * at[0] + m[4 + axis] * at[1] + m[8 + axis] * at[2] + m[12 + axis];
-                    in = in && array >= r->lower[axis] && array <= r->upper[axis];
-                    point[axis] = (float)(array * scale);
+                    point[axis] = first[axis] + (float)x * next[0][axis] +
+                                  (float)y * next[1][axis] + (float)z * next[2][axis];
+                    in = in && point[axis] >= lower[axis] && point[axis] <= upper[axis];
                 }
                 seen += in;
                 add_point(data, r->reduced_dims, r->field->info.channels, point, sum);

@@ -69,7 +69,8 @@ static const char help[] =
     "      --memory-budget MIB     on the GPU (default: 2048)\n"
     "\n"
     "Output\n"
-    "      --passes LIST           depth,normal,… or all, as further layers of the picture\n"
+    "      --passes LIST           further layers of the picture: all, or of depth,normal,volumedir,\n"
+    "                              emit,env,transmittance\n"
     "      --transparent           alpha tells coverage, the world is not drawn\n"
     "      --stats                 print stage times and memory\n"
     "  -v, --verbose               print what the library says\n"
@@ -193,17 +194,10 @@ static bool parse_size(const char *option, const char *text, options *out)
     return true;
 }
 
-/* "Volume Direct" is named volume-direct on the command line. */
+/* A word of the list, in any case. */
 static bool pass_matches(const char *name, const char *word, size_t length)
 {
-    if (strlen(name) != length)
-        return false;
-    for (size_t i = 0; i < length; i++) {
-        char c = name[i] == ' ' || name[i] == '_' ? '-' : name[i];
-        if (strncasecmp(&c, &word[i], 1) != 0)
-            return false;
-    }
-    return true;
+    return strlen(name) == length && strncasecmp(name, word, length) == 0;
 }
 
 static bool parse_passes(const char *option, const char *text, options *out)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BUILD = Path(os.environ.get("BRUME_BUILD", ROOT / "build"))
+BUILD = Path(os.environ.get("BRUME_BUILD", ROOT / "build")).resolve()
 
 INSTALL_AND_RENDER = """
 import bpy, sys

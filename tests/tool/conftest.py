@@ -10,7 +10,7 @@ import pyopenvdb as vdb
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BUILD = Path(os.environ.get("BRUME_BUILD", ROOT / "build"))
+BUILD = Path(os.environ.get("BRUME_BUILD", ROOT / "build")).resolve()
 
 
 @pytest.fixture(scope="session")

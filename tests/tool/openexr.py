@@ -54,7 +54,8 @@ def read(path):
     """Channel name -> array (height, width) of floats, top row first."""
     data = path.read_bytes()
     magic, version = struct.unpack_from("<ii", data)
-    assert magic == MAGIC and version & 0x1E00 == 0, f"{path}: no single-part scanline EXR"
+    # 0x400, long names, is the one flag that changes nothing here
+    assert magic == MAGIC and version & 0x1A00 == 0, f"{path}: no single-part scanline EXR"
     attributes, at = _attributes(data)
     channels = _channels(attributes["channels"])
     rows = ROWS_PER_CHUNK[attributes["compression"][0]]

@@ -60,8 +60,8 @@ static int64_t stream_read(exr_const_context_t context, void *user, void *buffer
     struct stream *stream = user;
     uint64_t done = 0;
     while (done < size) {
-        const ssize_t got = pread(stream->descriptor, (char *)buffer + done, size - done,
-                                  (off_t)(offset + done));
+        const ssize_t got =
+            pread(stream->descriptor, (char *)buffer + done, size - done, (off_t)(offset + done));
         if (got < 0 && errno == EINTR)
             continue;
         if (got < 0) {
@@ -322,8 +322,8 @@ static brume_result find_picture(const char *path, const struct stream *stream,
     if (width <= 0 || height <= 0)
         return fail(BRUME_E_FILE_FORMAT, "'%s' is damaged: its data window is empty", path);
     if ((uint64_t)width > MOST_PIXELS || (uint64_t)height > MOST_PIXELS / (uint64_t)width)
-        return fail(BRUME_E_MEMORY, "'%s' is too large: %lld x %lld pixels", path,
-                    (long long)width, (long long)height);
+        return fail(BRUME_E_MEMORY, "'%s' is too large: %lld x %lld pixels", path, (long long)width,
+                    (long long)height);
     out->left = window.min.x;
     out->top = window.min.y;
     out->width = (int32_t)width;
@@ -341,8 +341,8 @@ struct decoder {
 
 /* Decodes one chunk, whose top left pixel is at (left, top) of the picture, into RGBA pixels. */
 static exr_result_t read_chunk(exr_const_context_t context, const struct picture *picture,
-                               struct decoder *decoder, const exr_chunk_info_t *chunk,
-                               int32_t left, int32_t top, float *pixels)
+                               struct decoder *decoder, const exr_chunk_info_t *chunk, int32_t left,
+                               int32_t top, float *pixels)
 {
     exr_result_t code;
     const int32_t width = picture->width, height = picture->height;
@@ -378,8 +378,8 @@ static exr_result_t read_chunk(exr_const_context_t context, const struct picture
         coded->user_line_stride = chunk->width * (int32_t)sizeof(float);
     }
     if (!decoder->initialized &&
-        (code = exr_decoding_choose_default_routines(context, picture->part,
-                                                     &decoder->pipeline)) != EXR_ERR_SUCCESS)
+        (code = exr_decoding_choose_default_routines(context, picture->part, &decoder->pipeline)) !=
+            EXR_ERR_SUCCESS)
         return code;
     decoder->initialized = 1;
     if ((code = exr_decoding_run(context, picture->part, &decoder->pipeline)) != EXR_ERR_SUCCESS)
@@ -409,8 +409,7 @@ static exr_result_t read_scanlines(exr_const_context_t context, const struct pic
         return EXR_ERR_FILE_BAD_HEADER;
     for (int64_t top = 0; top < picture->height; top += rows) {
         exr_chunk_info_t chunk;
-        if ((code = exr_read_scanline_chunk_info(context, picture->part,
-                                                 (int)(picture->top + top),
+        if ((code = exr_read_scanline_chunk_info(context, picture->part, (int)(picture->top + top),
                                                  &chunk)) != EXR_ERR_SUCCESS ||
             (code = read_chunk(context, picture, decoder, &chunk, 0, (int32_t)top, pixels)) !=
                 EXR_ERR_SUCCESS)
@@ -482,9 +481,8 @@ brume_result exr_read(const char *path, int32_t *width, int32_t *height, float *
                       picture.height, path);
         goto end;
     }
-    code = picture.storage == EXR_STORAGE_TILED
-               ? read_tiles(context, &picture, &decoder, made)
-               : read_scanlines(context, &picture, &decoder, made);
+    code = picture.storage == EXR_STORAGE_TILED ? read_tiles(context, &picture, &decoder, made)
+                                                : read_scanlines(context, &picture, &decoder, made);
     if (code != EXR_ERR_SUCCESS) {
         result = bad_file(path, &stream, code);
         goto end;

@@ -99,7 +99,7 @@ struct recipe {
     int32_t tile;                     /* 0: scanlines */
     const char *channels;             /* one letter each, sorted; values are pattern() of "RGBA" */
     int sampling;
-    const char *first_part;           /* channels of a part before this one; NULL: none */
+    const char *first_part; /* channels of a part before this one; NULL: none */
 };
 
 static void store(void *to, exr_pixel_type_t type, int32_t x, int32_t y, char channel)
@@ -229,9 +229,8 @@ static void check_recipe(const struct recipe *recipe)
             const float *pixel = pixels + ((height - 1 - y) * width + x) * 4;
             for (int c = 0; c < 4; ++c) {
                 const char letter = c < 3 && grey ? 'Y' : "RGBA"[c];
-                const float value = strchr(recipe->channels, letter)
-                                        ? expected(recipe->type, x, y, letter)
-                                        : 1.0f;
+                const float value =
+                    strchr(recipe->channels, letter) ? expected(recipe->type, x, y, letter) : 1.0f;
                 if (pixel[c] != value)
                     fail_msg("pixel %d, %d, channel %d: %g, not %g", x, y, c, (double)pixel[c],
                              (double)value);
@@ -361,14 +360,14 @@ static void test_kinds(void **state)
 static void test_channels_and_windows(void **state)
 {
     (void)state;
-    check_recipe(&(struct recipe){EXR_PIXEL_FLOAT, EXR_COMPRESSION_ZIP, -7, -3, 20, 22, 0, "BGR",
-                                  0, NULL});
-    check_recipe(&(struct recipe){EXR_PIXEL_FLOAT, EXR_COMPRESSION_ZIP, 5, 100, 20, 22, 8, "BGR", 0,
-                                  NULL});
-    check_recipe(&(struct recipe){EXR_PIXEL_HALF, EXR_COMPRESSION_ZIP, 0, 0, 9, 1, 0, "Y", 0,
-                                  NULL});
-    check_recipe(&(struct recipe){EXR_PIXEL_FLOAT, EXR_COMPRESSION_ZIP, 0, 0, 1, 9, 0, "AY", 0,
-                                  NULL});
+    check_recipe(
+        &(struct recipe){EXR_PIXEL_FLOAT, EXR_COMPRESSION_ZIP, -7, -3, 20, 22, 0, "BGR", 0, NULL});
+    check_recipe(
+        &(struct recipe){EXR_PIXEL_FLOAT, EXR_COMPRESSION_ZIP, 5, 100, 20, 22, 8, "BGR", 0, NULL});
+    check_recipe(
+        &(struct recipe){EXR_PIXEL_HALF, EXR_COMPRESSION_ZIP, 0, 0, 9, 1, 0, "Y", 0, NULL});
+    check_recipe(
+        &(struct recipe){EXR_PIXEL_FLOAT, EXR_COMPRESSION_ZIP, 0, 0, 1, 9, 0, "AY", 0, NULL});
     /* The first part has no colours, the second has. */
     const char *path = in_folder("parts.exr");
     write_recipe(path, &(struct recipe){EXR_PIXEL_FLOAT, EXR_COMPRESSION_ZIP, 0, 0, 3, 2, 0, "ABGR",

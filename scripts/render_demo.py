@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import bpy
+from brume.properties import PASSES
 
 
 def save(path, file_format, color_depth, color_mode):
@@ -24,6 +25,10 @@ def main():
                        for word in sys.argv[sys.argv.index("--") + 1:])
     scene = bpy.context.scene
     scene.render.engine = "BRUME"
+    view_layer = bpy.context.view_layer
+    for *_, switch in PASSES:
+        owner, _, name = switch.rpartition(".")
+        setattr(getattr(view_layer, owner) if owner else view_layer, name, True)
     bpy.ops.render.render()
     save(picture, "PNG", "8", "RGB")
     save(layers, "OPEN_EXR_MULTILAYER", "32", "RGBA")

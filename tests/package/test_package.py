@@ -11,12 +11,16 @@ import pytest
 ROOT = Path(__file__).parents[2]
 BUILD = Path(os.environ.get("BRUME_BUILD", ROOT / "build")).resolve()
 
-INSTALL_AND_RENDER = """
-import bpy, sys
+INSTALL = """
+import bpy
 bpy.ops.preferences.addon_install(filepath={package!r})
 bpy.ops.preferences.addon_enable(module='brume')
-import brume
+"""
+
+RENDER = """
+import bpy, brume.native
 print('add-on at', brume.__file__)
+print('library at', brume.native.library_path())
 scene = bpy.context.scene
 scene.render.engine = 'BRUME'
 scene.render.resolution_x, scene.render.resolution_y = 48, 32
@@ -50,17 +54,41 @@ def test_same_input_same_zip(package, tmp_path):
     assert (tmp_path / package.name).read_bytes() == package.read_bytes()
 
 
-def test_installed_add_on_renders(package, tmp_path):
-    """Away from the checkout: library and shaders come out of the zip."""
+@pytest.fixture
+def blender(tmp_path):
+    """Runs Python in a Blender with empty user folders; BRUME_ variables are kept from it."""
     environment = {name: value for name, value in os.environ.items()
                    if not name.startswith("BRUME_")}
     environment["BLENDER_USER_SCRIPTS"] = str(tmp_path / "scripts")
     environment["BLENDER_USER_CONFIG"] = str(tmp_path / "config")
-    script = INSTALL_AND_RENDER.format(package=str(package), picture=str(tmp_path / "still.png"))
-    done = subprocess.run([os.environ.get("BLENDER", "blender"), "-b", "--factory-startup",
-                           "--python-exit-code", "1", "--python-expr", script], env=environment,
-                          stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300,
-                          check=False)
+
+    def blender(*scripts):
+        words = [word for script in scripts for word in ("--python-expr", script)]
+        return subprocess.run([os.environ.get("BLENDER", "blender"), "-b", "--factory-startup",
+                               "--python-exit-code", "1", *words], env=environment,
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              timeout=300, check=False)
+
+    return blender
+
+
+def test_installed_add_on_renders(package, blender, tmp_path):
+    """Away from the checkout: add-on, library and shaders come out of the zip."""
+    picture = tmp_path / "still.png"
+    install = INSTALL.format(package=str(package))
+    render = RENDER.format(picture=str(picture))
+    installed = tmp_path / "scripts" / "addons" / "brume"
+
+    done = blender(install, render)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert str(tmp_path / "scripts" / "addons" / "brume") in done.stdout
-    assert (tmp_path / "still.png").stat().st_size > 0
+    assert f"add-on at {installed}" in done.stdout
+    assert f"library at {installed}" in done.stdout
+    assert picture.stat().st_size > 0
+
+    # spoil an installed shader: if it is the one in use, the next render fails and names it
+    shader = installed / "lib" / "shaders" / "march.comp.glsl"
+    shader.write_text(shader.read_text() + "spoilt\n")
+    enable = "import bpy; bpy.ops.preferences.addon_enable(module='brume')"
+    done = blender(enable, render)
+    assert done.returncode == 1
+    assert "march.comp.glsl" in done.stdout + done.stderr

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from brume import native
+from conftest import write_vdb
 
 HEADER = Path(__file__).resolve().parents[2] / "csrc" / "brume.h"
 
@@ -50,6 +51,16 @@ def test_missing_file_has_an_id_and_names_the_file(tmp_path):
         native.vdb_list(path)
     assert caught.value.id == "FILE_MISSING"
     assert "nothing.vdb" in caught.value.sentence
+
+
+def test_truncated_file(tmp_path):
+    values = np.random.default_rng(1).random((40, 40, 40), np.float32)
+    path = Path(write_vdb(tmp_path / "cut.vdb", density=values))
+    path.write_bytes(path.read_bytes()[:100_000])
+    with pytest.raises(native.BrumeError) as caught:
+        native.Grid.load_vdb(path, "density")
+    assert caught.value.id == "FILE_FORMAT"
+    assert "cut.vdb" in caught.value.sentence
 
 
 def test_grid_round_trip():

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import native
+from ..compat import identity
 from ..native import BrumeError
 from . import fluid, light, material, mesh, volume, world
 from .target import key_of, key_of_datablock
@@ -25,12 +26,19 @@ class _Shape(NamedTuple):
 _NOTHING = _Shape(None, None, None)
 
 
+def _path(instance):
+    """What tells the instances of one object apart."""
+    if not instance.is_instance:
+        return ()
+    return (identity(instance.parent), *instance.persistent_id)
+
+
 class _Export:
     def __init__(self, depsgraph, target):
         self.depsgraph, self.target = depsgraph, target
         self.override = depsgraph.view_layer_eval.material_override
         self.view_layer = depsgraph.view_layer
-        self.shapes = {}    # by data and object
+        self.shapes = {}    # by data and object, and by data and materials
         self.names = {}     # how many meshes of one name came up
         self.programs = {}  # compiled volume shaders
         self.groups = {}    # (mesh, visibility) -> matrices
@@ -53,22 +61,21 @@ class _Export:
                             visibility=visibility)
 
     def instance(self, instance, ob):
-        path = tuple(instance.persistent_id) if instance.is_instance else ()
         if ob.type == 'LIGHT':
-            light.export(self.target, ob, np.array(instance.matrix_world), path,
+            light.export(self.target, ob, np.array(instance.matrix_world), _path(instance),
                          ob.visible_camera)
         elif ob.type == 'VOLUME':
             volume.export_volume_object(
                 self.target, self.programs, ob, np.array(instance.matrix_world),
-                key_of_datablock(ob, "volume", *path), self.override)
+                key_of_datablock(ob, "volume", *_path(instance)), self.override)
         elif ob.type in mesh.SURFACE_TYPES:
-            self.surface(instance, ob, path)
+            self.surface(instance, ob)
         elif ob.type not in _UNSEEN:
             self.warn(ob, f"objects of type {ob.type} are not shown.")
 
     # -- surfaces
 
-    def surface(self, instance, ob, path):
+    def surface(self, instance, ob):
         known = (ob.data.as_pointer(), ob.original.as_pointer())
         shape = self.shapes.get(known)
         if shape is None:
@@ -80,7 +87,7 @@ class _Export:
                 matrices = self.groups.setdefault((shape.mesh, visibility), [])
                 matrices.append(instance.matrix_world.copy())
         if shape.medium is not None:
-            self.medium(instance, ob, shape, key_of_datablock(ob, "medium", *path))
+            self.medium(instance, ob, shape, key_of_datablock(ob, "medium", *_path(instance)))
 
     def medium(self, instance, ob, shape, key):
         matrix = np.array(instance.matrix_world)
@@ -112,6 +119,10 @@ class _Export:
         slots = self.materials(ob)
         medium = next((m for m in slots if material.volume_tree(m)), None)
         domain = fluid.gas_domain(ob) is not None
+        # Objects without modifiers share their evaluated mesh.
+        shared = (ob.data.as_pointer(), tuple(m.as_pointer() if m else 0 for m in slots))
+        if ob.type == 'MESH' and not domain and shared in self.shapes:
+            return self.shapes[shared]
         seen = [i for i, m in enumerate(slots) if material.has_surface(m)]
         if domain and medium is None and not any(slots):
             return _NOTHING  # a domain without a material is no grey box
@@ -123,7 +134,8 @@ class _Export:
         arrays["triangle_slots"] = np.minimum(arrays["triangle_slots"], len(slots) - 1)
         drawn = mesh.only_slots(arrays, seen)
         key = self.put_mesh(ob, drawn, slots) if drawn else None
-        return _Shape(key, arrays if medium else None, medium)
+        shape = self.shapes[shared] = _Shape(key, arrays if medium else None, medium)
+        return shape
 
     def put_mesh(self, ob, arrays, slots):
         keys = tuple(material.export(self.target, m) for m in slots)

@@ -64,15 +64,17 @@ class _File:
 
 
 @contextmanager
-def _saved(volume):
-    """The file of a volume that has none of its own: packed bytes, or grids saved by Blender."""
+def _from_memory(write):
+    """A file that lives as long as the block; write(path) fills it."""
     with _scratch_file() as path:
-        if volume.packed_file:
-            Path(path).write_bytes(volume.packed_file.data)
-        elif not volume.grids.save(filepath=path):
-            raise BrumeError("VOLUME_SAVE", "its grids could not be saved by Blender.")
+        write(path)
         digest = hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest()
         yield _File(path, ("memory", digest))
+
+
+def _save(volume, path):
+    if not volume.grids.save(filepath=path):
+        raise BrumeError("VOLUME_SAVE", "its grids could not be saved by Blender.")
 
 
 @contextmanager
@@ -86,15 +88,20 @@ def _on_disk(path):
 
 def _file_of(ob):
     """A context that gives the file of a volume object, or None where it has no grids at all."""
-    volume = ob.data
-    plain = ob.original.type == 'VOLUME' and not ob.original.modifiers
-    if plain and volume.filepath and not volume.packed_file:
+    volume, original = ob.data, ob.original
+    if original.type == 'VOLUME' and not original.modifiers and volume.filepath:
+        packed = original.data.packed_file
+        if packed:  # Blender itself does not read these once the file is gone
+            return _from_memory(lambda path: Path(path).write_bytes(packed.data))
         volume.grids.load()
         path = volume.grids.frame_filepath
-        # No path: the frame lies outside of a sequence that is cut off there.
-        return _on_disk(bpy.path.abspath(path, library=volume.library)) if path else None
-    if volume.packed_file or volume.grids.load() and len(volume.grids) or len(volume.grids):
-        return _saved(volume)
+        if not path and volume.grids.error_message:
+            path = volume.filepath  # not there; the library says so
+        # Otherwise no path means that the frame lies outside of a sequence that ends there.
+        return _on_disk(bpy.path.abspath(path, library=original.data.library)) if path else None
+    volume.grids.load()
+    if len(volume.grids):
+        return _from_memory(lambda path: _save(volume, path))
     return None
 
 

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import staging  # noqa: E402
+import staging
 
 try:
     import pyopenvdb as vdb

@@ -10,7 +10,7 @@ import sys
 import bpy
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import staging  # noqa: E402
+import staging
 
 NAME = 'lamps'
 

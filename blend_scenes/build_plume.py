@@ -13,7 +13,7 @@ import sys
 import bpy
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import staging  # noqa: E402
+import staging
 
 NAME = 'plume'
 FRAME = 66          # the frame that is kept

@@ -7,10 +7,8 @@ stands inside room and fog.
 import os
 import sys
 
-import bpy  # noqa: F401 (run by Blender)
-
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import staging  # noqa: E402
+import staging
 
 NAME = 'room'
 WIDTH, DEPTH, HEIGHT, WALL = 6.0, 8.0, 3.2, 0.2
@@ -41,8 +39,8 @@ slab('Left sill', (-x - WALL, y0, 0), (-x, y1, z0), plaster)
 slab('Left lintel', (-x - WALL, y0, z1), (-x, y1, top), plaster)
 for i in range(3):  # bars that cut the beam into shafts
     bar = y0 + (i + 1) * (y1 - y0) / 4
-    slab(f'Bar {i + 1}', (-x - WALL / 2 - 0.03, bar - 0.05, z0), (-x - WALL / 2 + 0.03, bar + 0.05, z1),
-         iron)
+    middle = -x - WALL / 2
+    slab(f'Bar {i + 1}', (middle - 0.03, bar - 0.05, z0), (middle + 0.03, bar + 0.05, z1), iron)
 
 staging.box('Plinth', (0.7, 0.7, 0.9), (0.55, 1.35, 0.45), plaster, bevel=0.02, rotation=0.3)
 staging.sphere('Ball', 0.33, (0.55, 1.35, 1.23), velvet)

@@ -12,7 +12,7 @@ FOLDER = os.path.dirname(os.path.abspath(__file__))
 
 
 def begin(name):
-    """Empties the factory scene (its workspaces stay) and saves it, so that // paths have a root."""
+    """Empties the factory scene, not its workspaces, and saves it: // paths need a root."""
     for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.lights, bpy.data.cameras,
                        bpy.data.materials, bpy.data.worlds):
         for block in list(collection):
@@ -116,7 +116,7 @@ def matt(name, color):
 
 
 def volume(name, shader_type, **inputs):
-    """A material with a volume shader alone; `Density_Attribute=...` sets input "Density Attribute"."""
+    """A material with a volume shader alone; Emission_Color=... sets input "Emission Color"."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree

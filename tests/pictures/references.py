@@ -12,7 +12,6 @@ import subprocess
 import tempfile
 
 import numpy as np
-
 from cases import REFERENCES, SCENES
 from compare import difference
 

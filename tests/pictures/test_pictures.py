@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import compare  # noqa: E402
-import references  # noqa: E402
-from cases import CASES, ROOT  # noqa: E402
+import compare
+import references
+from cases import CASES, ROOT
 
 BLENDER = [os.path.join(ROOT, 'scripts', 'blender'), '--factory-startup']
 OUT = os.path.join(ROOT, 'out', 'pictures')
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def brume(name):
     return references.render(BLENDER, 'BRUME', CASES[name])
 

@@ -54,14 +54,14 @@ class BrumeEngine(bpy.types.RenderEngine):
             self.update_stats("", "Brume | Exporting")
             scene.export(depsgraph, stage.target)
             view, passes = self._view(depsgraph, result, stage.target)
-            self._report(stage.target.reports)
+            self._warn(stage.target.reports)
             exported = time.perf_counter()
             settings = native_settings(depsgraph.scene_eval.brume)
             job = stage.scene.render(settings, view)
             try:
                 if not self._wait(job, view.samples):
                     return
-                self._report(job.warnings())
+                self._warn(job.warnings())
                 self._write(result, job, passes)
                 self._finish(depsgraph, job.stats(), exported - began,
                              time.perf_counter() - began)
@@ -115,13 +115,14 @@ class BrumeEngine(bpy.types.RenderEngine):
         for number, name, channels, _ in passes:
             target = layer.passes.find_by_name(name, "")
             if target is None:
-                self.report({'WARNING'}, f"Blender has no pass {name} in this result")
+                self._warn([("PASS", f"Blender has no pass {name} in this result")])
                 continue
             pixels = job.read(number)
             compat.set_pass(target, pixels[..., :len(channels)])
         self.update_progress(1.0)
 
-    def _report(self, entries):
+    def _warn(self, entries):
+        """Reports what is not shown; in background, where reports are not seen, in print."""
         for _, sentence in entries:
             self.report({'WARNING'}, sentence)
             if bpy.app.background and not self.is_preview:

@@ -8,8 +8,21 @@ returns. Every call may be made from any thread; ctypes releases the GIL while t
 import ctypes
 import itertools
 import os
-from ctypes import POINTER, Structure, byref, c_char, c_char_p, c_double, c_float, c_int32
-from ctypes import c_int64, c_size_t, c_uint16, c_uint32, c_uint64, c_void_p
+from ctypes import (
+    POINTER,
+    Structure,
+    byref,
+    c_char,
+    c_char_p,
+    c_double,
+    c_float,
+    c_int32,
+    c_int64,
+    c_size_t,
+    c_uint32,
+    c_uint64,
+    c_void_p,
+)
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +48,7 @@ OPS = (
 OP = {name: number for number, name in enumerate(OPS)}
 REGISTERS = 64
 RAMP_SIZE = 256
+IDENTITY = np.eye(4)
 
 
 class BrumeError(Exception):
@@ -471,7 +485,7 @@ class Scene(Handle):
             spot_angle, spot_blend, spread, 1.0, 1.0, 1.0, LIGHTS[type], cast_shadow,
             camera_visible)))
 
-    def set_world(self, *, color, image=0, image_from_world=np.eye(4), volume=None, reach=0.0):
+    def set_world(self, *, color, image=0, image_from_world=IDENTITY, volume=None, reach=0.0):
         """volume: None, or sigma_s, sigma_a, emission (three floats each) and g."""
         sigma_s, sigma_a, emission, g = volume or ((0, 0, 0), (0, 0, 0), (0, 0, 0), 0.0)
         library().scene_set_world(self.pointer, byref(World(

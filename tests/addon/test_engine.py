@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whole renders inside Blender, with the real library, and Blender processes with broken ones."""
+
+import math
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from brume import engine, native, properties, session
+from conftest import add, cube, material
+
+ROOT = Path(__file__).resolve().parents[2]
+SIZE = 24, 32  # rows, columns
+
+
+def lit(scene, density=2.0):
+    """A fog cube in the sun, seen from the front."""
+    fog, nodes = material("Fog")
+    nodes.volume(nodes.node("VolumeScatter", Color=(1, 1, 1, 1), Density=density))
+    cube("Fog", material=fog)
+    sun = bpy.data.lights.new("Sun", 'SUN')
+    sun.energy = 10.0
+    add("Sun", sun).rotation_euler = (0.6, 0.3, 0)
+    camera = bpy.data.cameras.new("Camera")
+    scene.camera = add("Camera", camera, location=(0, -6, 0))
+    scene.camera.rotation_euler = (math.pi / 2, 0, 0)
+    scene.render.film_transparent = True
+    return scene
+
+
+@pytest.fixture
+def render(tmp_path):
+    """Renders Blender's scene to a file; gives its pixels, rows from the bottom."""
+    def run(name="picture"):
+        path = tmp_path / f"{name}.exr"
+        bpy.context.scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True)
+        return native.exr_read(path)
+    return run
+
+
+@pytest.fixture
+def reported(monkeypatch):
+    """The sentences of the engine's warnings."""
+    sentences = []
+    monkeypatch.setattr(engine.BrumeEngine, "_warn", lambda self, entries: sentences.extend(
+        sentence for _, sentence in entries))
+    return sentences
+
+
+def test_fog_cube(scene, render):
+    lit(scene)
+    pixels = render()
+    assert pixels.shape == (*SIZE, 4)
+    assert np.isfinite(pixels).all()
+    middle, corner = pixels[12, 16], pixels[0, 0]
+    assert middle[:3].min() > 0.05
+    # 2 m of fog of 2/m: next to nothing passes.
+    assert middle[3] > 0.9
+    assert not corner.any()
+
+
+def test_light_is_linear_in_power(scene, render):
+    lit(scene)
+    one = render()
+    bpy.data.lights["Sun"].energy *= 2
+    np.testing.assert_allclose(render("b")[..., :3], 2 * one[..., :3], rtol=1e-3, atol=1e-4)
+
+
+def test_same_pixels_every_time(scene, render):
+    lit(scene)
+    first = render()
+    session.drop("final")
+    assert np.array_equal(render("b"), first)
+
+
+def test_camera_moves_reuse_the_medium(scene, render, monkeypatch):
+    lit(scene)
+    stats = []
+    finish = engine.BrumeEngine._finish
+    monkeypatch.setattr(engine.BrumeEngine, "_finish", lambda self, depsgraph, found, *times: (
+        stats.append(found), finish(self, depsgraph, found, *times)))
+    render()
+    scene.camera.location.z = 0.3
+    render("b")
+    medium = native.STAGES.index("medium")
+    march = native.STAGES.index("march")
+    assert stats[0].stages[medium].revision == stats[1].stages[medium].revision
+    assert stats[0].stages[march].runs < stats[1].stages[march].runs
+
+
+def test_missing_vdb_leaves_the_rest(scene, render, reported):
+    lit(scene)
+    whole = render()
+    cloud = bpy.data.volumes.new("Cloud")
+    cloud.filepath = "/nowhere/none.vdb"
+    add("Cloud", cloud)
+    assert np.array_equal(render("b"), whole)
+    assert len(reported) == 1
+    assert "Cloud" in reported[0]
+    assert "none.vdb" in reported[0]
+
+
+def test_zero_scale_leaves_the_rest(scene, render, reported):
+    lit(scene)
+    whole = render()
+    cube("Flat", material=bpy.data.materials["Fog"], scale=(1, 1, 0))
+    assert np.array_equal(render("b"), whole)
+    assert any("Flat" in sentence for sentence in reported)
+
+
+@pytest.mark.parametrize("crop", [True, False])
+def test_border(scene, render, crop):
+    lit(scene)
+    scene.brume.samples = 32
+    whole = render()
+    scene.render.use_border, scene.render.use_crop_to_border = True, crop
+    (scene.render.border_min_x, scene.render.border_max_x, scene.render.border_min_y,
+     scene.render.border_max_y) = 0.25, 0.75, 0.25, 0.5
+    part = render("part")
+    inside = whole[6:12, 8:24]
+    if crop:
+        assert part.shape == inside.shape
+    else:
+        assert part.shape == whole.shape
+        assert not part[:6].any()
+        part = part[6:12, 8:24]
+    # The samples' jitter differs between the two; the picture is smooth in here.
+    assert np.abs(part - inside).mean() < 0.03 * inside.mean()
+
+
+def test_resolution_percentage_and_pixel_aspect(scene, render):
+    lit(scene)
+    scene.render.resolution_percentage = 50
+    assert render().shape == (12, 16, 4)
+    scene.render.resolution_percentage = 100
+    scene.camera.data.sensor_fit = 'HORIZONTAL'
+    square = render("b")[..., 3]
+    scene.render.pixel_aspect_y = 2.0
+    # Pixels twice as high: the cube covers half as many rows.
+    tall = render("c")[..., 3]
+    rows = [(picture[:, 16] > 0.5).sum() for picture in (square, tall)]
+    assert abs(rows[0] - 2 * rows[1]) <= 2
+
+
+def test_world_is_drawn(scene, render):
+    lit(scene)
+    scene.render.film_transparent = False
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.color = (0.1, 0.2, 0.3)
+    np.testing.assert_allclose(render()[0, 0], (0.1, 0.2, 0.3, 1.0), rtol=1e-3)
+
+
+def test_passes_reach_the_file(scene, tmp_path):
+    lit(scene)
+    layer = bpy.context.view_layer
+    layer.use_pass_z = layer.use_pass_normal = True
+    layer.use_pass_emit = layer.use_pass_environment = True
+    layer.brume.use_pass_volume_direct = layer.brume.use_pass_transmittance = True
+    scene.render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+    scene.render.filepath = str(tmp_path / "layers.exr")
+    bpy.ops.render.render(write_still=True)
+    names = header_channels(tmp_path / "layers.exr")
+    wanted = {f"ViewLayer.{name}.{c}" for name, channels in (
+        ("Combined", "RGBA"), ("Depth", "Z"), ("Normal", "XYZ"), ("Emit", "RGB"), ("Env", "RGB"),
+        ("VolumeDir", "RGB"), ("Transmittance", "RGB")) for c in channels}
+    assert wanted == {name for name in names if name.startswith("ViewLayer.")}
+
+
+def header_channels(path):
+    """Channel names from the header of an EXR file."""
+    data = path.read_bytes()
+    at = data.index(b"channels\0chlist\0") + len(b"channels\0chlist\0") + 4
+    names = []
+    while data[at]:
+        end = data.index(b"\0", at)
+        names.append(data[at:end].decode())
+        at = end + 1 + 16
+    return names
+
+
+def test_two_view_layers(scene, tmp_path):
+    lit(scene)
+    second = scene.view_layers.new("Second")
+    second.use_pass_z = True
+    scene.view_layers[0].use_pass_z = False
+    scene.render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+    scene.render.filepath = str(tmp_path / "layers.exr")
+    bpy.ops.render.render(write_still=True)
+    names = header_channels(tmp_path / "layers.exr")
+    assert "ViewLayer.Combined.R" in names
+    assert "Second.Combined.R" in names
+    assert "Second.Depth.Z" in names
+    assert "ViewLayer.Depth.Z" not in names
+
+
+def test_no_camera(scene, render):
+    lit(scene)
+    bpy.data.objects.remove(scene.camera)
+    with pytest.raises(RuntimeError, match="camera"):
+        render()
+
+
+def test_a_failed_render_is_no_crash_and_the_next_works(scene, render, monkeypatch):
+    lit(scene)
+
+    def broken(*args):
+        raise native.BrumeError("GPU", "the driver is on fire")
+    with monkeypatch.context() as patch:
+        patch.setattr(session, "stage", broken)
+        with pytest.raises(RuntimeError, match="the driver is on fire"):
+            render()
+    assert render("b")[12, 16, 3] > 0.9
+
+
+def test_persistent_data_and_animation(scene, tmp_path):
+    lit(scene)
+    scene.render.filepath = str(tmp_path / "frame_")
+    scene.frame_start, scene.frame_end = 1, 2
+    bpy.ops.render.render(animation=True)
+    assert len(list(tmp_path.glob("frame_*.exr"))) == 2
+
+
+def test_presets(scene):
+    for name, values in properties.PRESETS.items():
+        scene.brume.preset = name
+        for key, value in values.items():
+            assert getattr(scene.brume, key) == value
+        settings = properties.native_settings(scene.brume)
+        assert settings.medium_resolution == values["medium_resolution"]
+    for key, value in properties.PRESETS['PREVIEW'].items():
+        assert scene.brume.bl_rna.properties[key].default == value
+
+
+def test_panels_apply():
+    marked = [panel.__name__ for panel in bpy.types.Panel.__subclasses__()
+              if 'BRUME' in getattr(panel, "COMPAT_ENGINES", ())]
+    for name in ('EEVEE_MATERIAL_PT_surface', 'EEVEE_MATERIAL_PT_volume', 'DATA_PT_EEVEE_light',
+                 'EEVEE_WORLD_PT_surface', 'RENDER_PT_format', 'DATA_PT_volume_file'):
+        assert name in marked, name
+
+
+# -- other processes
+
+
+def blender(*arguments, **environment):
+    return subprocess.run(
+        [ROOT / "scripts" / "blender", "-b", *arguments], capture_output=True, text=True,
+        timeout=300, env=os.environ | environment)
+
+
+@pytest.fixture
+def saved(scene, tmp_path):
+    lit(scene)
+    scene.render.engine = 'CYCLES'
+    path = tmp_path / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    return path
+
+
+def test_engine_from_the_command_line(saved, tmp_path):
+    done = blender(saved, "-E", "BRUME", "-o", tmp_path / "out_####", "-f", "1")
+    assert done.returncode == 0, done.stderr
+    assert "Brume | " in done.stdout
+    assert (tmp_path / "out_0001.exr").exists()
+
+
+def test_cancel(saved, tmp_path):
+    """Ctrl-C is how a render in background is broken off. Half a second and one stage, and what
+    Blender itself takes to end."""
+    process = subprocess.Popen(
+        [ROOT / "scripts" / "blender", "-b", saved, "--python-expr",
+         "import bpy; bpy.context.scene.brume.samples = 65536", "-E", "BRUME",
+         "-o", tmp_path / "out_####", "-f", "1"], stdout=subprocess.PIPE, text=True)
+    for line in process.stdout:
+        if "Sample" in line:
+            break
+    process.send_signal(signal.SIGINT)
+    asked = time.perf_counter()
+    rest, _ = process.communicate(timeout=60)
+    assert time.perf_counter() - asked < 2.0
+    assert process.returncode in {0, 1}, "Blender crashed"
+    assert "Saved" not in rest
+    assert not (tmp_path / "out_0001.exr").exists()
+
+
+def test_missing_library(saved, tmp_path):
+    done = blender(saved, "-E", "BRUME", "-o", tmp_path / "out_####", "-f", "1",
+                   BRUME_LIBRARY=str(tmp_path / "no.so"))
+    assert "LIBRARY_MISSING" in done.stdout + done.stderr
+    assert "no.so" in done.stdout + done.stderr
+    assert done.returncode in {0, 1}, "Blender crashed"
+    assert not (tmp_path / "out_0001.exr").exists()
+
+
+def test_library_of_another_abi(saved, tmp_path):
+    source = tmp_path / "other.c"
+    source.write_text("unsigned brume_abi(void) { return 999; }"
+                      "unsigned long brume_struct_size(const char *n) { return 1; }")
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "other.so", source], check=True)
+    done = blender(saved, "-E", "BRUME", "-o", tmp_path / "out_####", "-f", "1",
+                   BRUME_LIBRARY=str(tmp_path / "other.so"))
+    assert "LIBRARY_ABI" in done.stdout + done.stderr
+    assert done.returncode in {0, 1}, "Blender crashed"
+
+
+def test_add_on_goes_and_comes(scene):
+    import addon_utils
+    addon_utils.disable("brume")
+    assert not hasattr(bpy.types.Scene, "brume")
+    addon_utils.enable("brume", persistent=True)
+    assert bpy.context.scene.brume.method == 'OPV'

@@ -68,7 +68,7 @@ class View:
     def draw(self, engine, context, depsgraph):
         if self.failed is None:
             try:
-                self._advance(context, depsgraph)
+                self._advance(engine, context, depsgraph)
             except native.BrumeError as error:
                 self._fail(engine, error)
         if self.picture is not None:
@@ -92,7 +92,7 @@ class View:
             self.job.close()
             self.job = None
 
-    def _advance(self, context, depsgraph):
+    def _advance(self, engine, context, depsgraph):
         """Takes a finished picture and starts the next job."""
         if self.job is not None:
             status = self.job.poll()
@@ -101,6 +101,7 @@ class View:
                 if status.state == native.JOB_DONE:
                     self.picture, self.texture = self.job.read(0), None
                     self.level += 1
+                    self._tell(engine, depsgraph, self.job)
                 self._drop_job()
         region, space = context.region, context.region_data
         wanted = (self.exports, region.width, region.height,
@@ -113,6 +114,16 @@ class View:
             self.wanted, self.level = wanted, 0
         if self.job is None and self.level < len(REFINEMENT):
             self._start(context, depsgraph)
+
+    def _tell(self, engine, depsgraph, job):
+        """The stages' times in the view's corner, if wanted."""
+        text = ""
+        if depsgraph.scene_eval.brume.show_statistics:
+            stats = job.stats()
+            times = (f"{native.library().stage_name(i).decode()} {stats.stages[i].wall_ms:.0f}"
+                     for i in range(len(native.STAGES)))
+            text = f"{stats.samples} samples | {', '.join(times)} ms"
+        engine.update_stats("", text)
 
     def _start(self, context, depsgraph):
         region, space = context.region, context.region_data

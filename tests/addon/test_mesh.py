@@ -15,8 +15,7 @@ def evaluated(ob):
 
 
 def read(ob):
-    with mesh.mesh_of(evaluated(ob)) as data:
-        return mesh.read(data)
+    return mesh.read(evaluated(ob).data)
 
 
 def face_normals(arrays):
@@ -101,15 +100,3 @@ def test_modifiers_count(scene):
 
 def test_nothing_to_draw(scene):
     assert read(add("Empty", bpy.data.meshes.new("Empty"))) is None
-
-
-@pytest.mark.parametrize("kind", ['CURVE', 'FONT', 'META'])
-def test_other_kinds_become_meshes(scene, kind):
-    if kind == 'CURVE':
-        bpy.ops.curve.primitive_bezier_circle_add()
-        bpy.context.object.data.bevel_depth = 0.1
-    elif kind == 'FONT':
-        bpy.ops.object.text_add()
-    else:
-        bpy.ops.object.metaball_add()
-    assert len(read(bpy.context.object)["triangles"]) > 10

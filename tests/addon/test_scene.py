@@ -427,3 +427,18 @@ def test_keys_do_not_depend_on_the_run():
     from brume.export.target import key_of
     assert key_of("a", 1) == key_of("a", 1) != key_of("a", 2)
     assert key_of("Mesh:Cube:", "mesh", 1) == 1474453074855972488
+
+
+@pytest.mark.parametrize("kind", ['CURVE', 'FONT', 'META'])
+def test_other_kinds_are_drawn_once(scene, export, kind):
+    if kind == 'CURVE':
+        bpy.ops.curve.primitive_bezier_circle_add()
+        bpy.context.object.data.bevel_depth = 0.1
+    elif kind == 'FONT':
+        bpy.ops.object.text_add()
+    else:
+        bpy.ops.object.metaball_add()
+    recorder = export()
+    assert len(recorder.of("mesh")) == 1
+    block, = recorder.of("instances")
+    assert len(block["world_from_object"]) == 1

@@ -1,26 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Evaluated meshes, and what turns into one, to the arrays of brume_mesh."""
-
-from contextlib import contextmanager
+"""Evaluated meshes to the arrays of brume_mesh."""
 
 import numpy as np
 
 from .. import compat
-
-SURFACE_TYPES = {'MESH', 'CURVE', 'SURFACE', 'FONT', 'META'}
-
-
-@contextmanager
-def mesh_of(ob):
-    """The object's evaluated mesh, for the time of the block; None if it has no faces."""
-    if ob.type == 'MESH':
-        yield ob.data
-        return
-    mesh = ob.to_mesh()
-    try:
-        yield mesh
-    finally:
-        ob.to_mesh_clear()
 
 
 def _get(collection, name, width, dtype):

@@ -11,8 +11,9 @@ from ..native import BrumeError
 from . import fluid, light, material, mesh, volume, world
 from .target import key_of, key_of_datablock
 
-# Drawn by neither Brume nor Cycles.
-_UNSEEN = {'EMPTY', 'ARMATURE', 'LATTICE', 'CAMERA', 'SPEAKER', 'LIGHT_PROBE'}
+# Drawn by neither Brume nor Cycles, or presented to engines a second time, as a mesh.
+_UNSEEN = {'EMPTY', 'ARMATURE', 'LATTICE', 'CAMERA', 'SPEAKER', 'LIGHT_PROBE', 'CURVE', 'SURFACE',
+           'FONT', 'META'}
 
 
 class _Shape(NamedTuple):
@@ -68,7 +69,7 @@ class _Export:
             volume.export_volume_object(
                 self.target, self.programs, ob, np.array(instance.matrix_world),
                 key_of_datablock(ob, "volume", *_path(instance)), self.override)
-        elif ob.type in mesh.SURFACE_TYPES:
+        elif ob.type == 'MESH':
             self.surface(instance, ob)
         elif ob.type not in _UNSEEN:
             self.warn(ob, f"objects of type {ob.type} are not shown.")
@@ -108,9 +109,9 @@ class _Export:
         return bits
 
     def materials(self, ob):
-        """The material of each slot; never empty."""
+        """The material of each slot; never empty. What modifiers or curves made has its own."""
         own = ob.original.evaluated_get(self.depsgraph).data == ob.data
-        found = ([slot.material for slot in ob.material_slots] if own or ob.type != 'MESH'
+        found = ([slot.material for slot in ob.material_slots] if own
                  else list(ob.data.materials)) or [None]
         return [self.override] * len(found) if self.override else found
 
@@ -121,13 +122,12 @@ class _Export:
         domain = fluid.gas_domain(ob) is not None
         # Objects without modifiers share their evaluated mesh.
         shared = (ob.data.as_pointer(), tuple(m.as_pointer() if m else 0 for m in slots))
-        if ob.type == 'MESH' and not domain and shared in self.shapes:
+        if not domain and shared in self.shapes:
             return self.shapes[shared]
         seen = [i for i, m in enumerate(slots) if material.has_surface(m)]
         if domain and medium is None and not any(slots):
             return _NOTHING  # a domain without a material is no grey box
-        with mesh.mesh_of(ob) as data:
-            arrays = mesh.read(data) if data else None
+        arrays = mesh.read(ob.data)
         if arrays is None:
             return _NOTHING
         # A slot number beyond the slots means the last one, as in Blender.

@@ -39,91 +39,156 @@ float mean_inverse_square(float t0, float t1, float h)
     return angle / (h * (t1 - t0));
 }
 
-// Light of all lamps that the point scatters towards the viewer, per unit of sigma_s.
-vec3 lamp_scatter(view_ray ray, float t, float t0, float t1, float g, ivec2 pixel)
+// The medium at one step of the ray: lattice and fog together.
+struct medium_step
 {
-    vec3 p = ray.origin + ray.direction * t;
-    vec3 sum = vec3(0.0);
-    for (uint i = 0u; i < frame.counts.x; ++i) {
-        gpu_light light = lights[i];
-        uint turn = (uint(frame.size.z) + pixel_hash(pixel, i)) % light.samples.y;
-        gpu_light_sample light_sample = light_samples[light.samples.x + turn];
-        vec3 towards;
-        float square;
-        vec3 intensity = light_intensity(light, light_sample.position.xyz, p, towards, square) *
-                         light.factors.z;
-        if (intensity == vec3(0.0))
-            continue;
-        float distance = 1e30;
-        if (light.info.x != uint(LIGHT_SUN)) {
-            distance = sqrt(square);
-            float along = dot(light_sample.position.xyz - ray.origin, ray.direction);
-            float h = sqrt(max(square - (along - t) * (along - t), 1e-8));
-            intensity *= mean_inverse_square(t0 - along, t1 - along, h);
+    vec3 sigma_s, sigma_t, emission;
+    float g;
+};
+
+// False where the step is empty; `skipped` more steps then are too.
+bool look_up(view_ray ray, float t, float dt, float within, bool in_lattice, bool emission,
+             out medium_step m, out int skipped)
+{
+    m = medium_step(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    skipped = 0;
+    bool fog = fog_exists();
+    if (in_lattice) {
+        vec3 p = ray.origin + ray.direction * t;
+        float skip = medium_skip(p, ray.direction);
+        if (skip > 0.0) {
+            if (!fog) {
+                skipped = medium_steps_to_skip(skip, dt, within);
+                return false;
+            }
+        } else {
+            vec3 uvw = medium_coordinate(p);
+            vec4 scatter = textureLod(medium_scatter, uvw, 0.0);
+            m.sigma_s = scatter.rgb;
+            m.g = scatter.a;
+            m.sigma_t = textureLod(medium_extinct, uvw, 0.0).rgb;
+            if (emission && frame.medium_upper.w != 0.0)
+                m.emission = textureLod(medium_emission, uvw, 0.0).rgb;
         }
-        float lit = light_shadow(light, light_sample, p, vec3(0.0), false);
-        if (lit > 0.0)
-            sum += intensity * lit * phase_hg(dot(-towards, -ray.direction), g) *
-                   light_transmittance(light, p, towards, distance);
     }
-    return sum;
+    if (fog) {
+        float here = luminance(m.sigma_s), there = luminance(frame.fog_sigma_s.rgb);
+        m.g = (here * m.g + there * frame.fog_sigma_s.w) / max(here + there, 1e-30);
+        m.sigma_s += frame.fog_sigma_s.rgb;
+        m.sigma_t += frame.fog_sigma_t.rgb;
+        m.emission += frame.fog_emission.rgb;
+    }
+    return m.sigma_t != vec3(0.0) || m.emission != vec3(0.0);
 }
 
-// One stretch of the ray, in count even steps, each seen at one jittered point.
+// Integral of exp(-sigma_t s) over the step; its limit where the medium is thin.
+vec3 step_weight(vec3 sigma_t, vec3 through, float dt)
+{
+    return mix((1.0 - through) / max(sigma_t, vec3(1e-12)), vec3(dt),
+               lessThan(sigma_t * dt, vec3(1e-4)));
+}
+
+// What is left behind this could no longer be told from black.
+bool is_black(vec3 transmittance)
+{
+    return max(max(transmittance.r, transmittance.g), transmittance.b) < 1e-4;
+}
+
+// Each step has a jitter of its own: the errors of a ray's steps then cancel one another.
+float step_jitter(float jitter, int k)
+{
+    return fract(jitter + float(k) * 0.754877666);
+}
+
+// What one lamp adds along the stretch. Lamps are the outer loop: their data are read once a ray.
+vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, vec2 span, int count,
+                bool in_lattice, ivec2 pixel, float jitter)
+{
+    gpu_light light = lights[number];
+    uint turn = (uint(frame.size.z) + pixel_hash(pixel, number)) % light.samples.y;
+    gpu_light_sample light_sample = light_samples[light.samples.x + turn];
+    gpu_shadow_view view;
+    bool one_view = light.samples.z == 1u && light_sample.position.w >= 0.0;
+    if (one_view)
+        view = shadow_views[int(light_sample.position.w)];
+    bool sun = light.info.x == uint(LIGHT_SUN);
+    float along = dot(light_sample.position.xyz - ray.origin, ray.direction);
+    float dt = (span.y - span.x) / float(count);
+    vec3 sum = vec3(0.0);
+    for (int k = 0; k < count; ++k) {
+        float within = step_jitter(jitter, k);
+        float t0 = span.x + float(k) * dt;
+        float t = t0 + within * dt;
+        medium_step m;
+        int skipped;
+        if (!look_up(ray, t, dt, within, in_lattice, false, m, skipped)) {
+            k += skipped;
+            continue;
+        }
+        vec3 through = exp(-m.sigma_t * dt);
+        vec3 p = ray.origin + ray.direction * t;
+        vec3 towards;
+        float square;
+        vec3 light_here = light_intensity(light, light_sample.position.xyz, p, towards, square);
+        if (light_here != vec3(0.0)) {
+            int layer = one_view ? int(light_sample.position.w) : shadow_layer(light, light_sample, p);
+            if (layer >= 0) {
+                if (!one_view)
+                    view = shadow_views[layer];
+                light_here *= shadow_test(view, layer, p, 0.0, false);
+            }
+        }
+        if (light_here != vec3(0.0)) {
+            float distance = 1e30;
+            if (!sun) {
+                distance = sqrt(square);
+                float h = sqrt(max(square - (along - t) * (along - t), 1e-8));
+                light_here *= mean_inverse_square(t0 - along, t0 + dt - along, h);
+            }
+            sum += transmittance * step_weight(m.sigma_t, through, dt) * m.sigma_s * light_here *
+                   (phase_hg(dot(towards, ray.direction), m.g) *
+                    light_transmittance(light, p, towards, distance));
+        }
+        transmittance *= through;
+        if (is_black(transmittance))
+            break;
+    }
+    return sum * light.factors.z;
+}
+
+// Transmittance, emission and the world's light along the stretch.
 void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_lattice,
            ivec2 pixel, float jitter)
 {
+    for (uint i = 0u; i < frame.counts.x; ++i)
+        state.direct += march_lamp(i, state.transmittance, ray, span, count, in_lattice, pixel,
+                                   jitter);
     float dt = (span.y - span.x) / float(count);
-    bool emits = in_lattice && frame.medium_upper.w != 0.0;
-    bool fog = fog_exists();
+    // The sky's lattice is much coarser than a step.
+    float sky_every = max(frame.sky_lower.w, dt);
+    float sky_next = -1e30;
+    vec3 sky = vec3(0.0);
     for (int k = 0; k < count; ++k) {
-        float t0 = span.x + float(k) * dt;
-        // Each step has a jitter of its own: the errors of a ray's steps then cancel one another.
-        float t = t0 + fract(jitter + float(k) * 0.754877666) * dt;
-        vec3 p = ray.origin + ray.direction * t;
-        vec4 scatter = vec4(0.0);
-        vec3 extinct = vec3(0.0), emission = vec3(0.0);
-        if (in_lattice) {
-            float skip = medium_skip(p, ray.direction);
-            if (skip > 0.0) {
-                if (!fog) {
-                    k += int(skip / dt);
-                    continue;
-                }
-            } else {
-                vec3 uvw = medium_coordinate(p);
-                scatter = textureLod(medium_scatter, uvw, 0.0);
-                extinct = textureLod(medium_extinct, uvw, 0.0).rgb;
-                if (emits)
-                    emission = textureLod(medium_emission, uvw, 0.0).rgb;
-            }
-        }
-        if (fog) {
-            float both = luminance(scatter.rgb) + luminance(frame.fog_sigma_s.rgb);
-            scatter.a = both > 0.0 ? (luminance(scatter.rgb) * scatter.a +
-                                      luminance(frame.fog_sigma_s.rgb) * frame.fog_sigma_s.w) / both
-                                   : 0.0;
-            scatter.rgb += frame.fog_sigma_s.rgb;
-            extinct += frame.fog_sigma_t.rgb;
-            emission += frame.fog_emission.rgb;
-        }
-        if (extinct == vec3(0.0) && emission == vec3(0.0))
+        float within = step_jitter(jitter, k);
+        float t = span.x + (float(k) + within) * dt;
+        medium_step m;
+        int skipped;
+        if (!look_up(ray, t, dt, within, in_lattice, true, m, skipped)) {
+            k += skipped;
             continue;
-        vec3 through = exp(-extinct * dt);
-        // Integral of exp(-sigma_t s) over the step; its limit where the medium is thin.
-        vec3 weight = mix((1.0 - through) / max(extinct, vec3(1e-12)), vec3(dt),
-                          lessThan(extinct * dt, vec3(1e-4)));
-        weight *= state.transmittance;
-        if (scatter.rgb != vec3(0.0)) {
-            vec3 light = lamp_scatter(ray, t, t0, t0 + dt, scatter.a, pixel);
-            if (frame.sky_dims.w != 0)
-                light += sky_scatter(p, -ray.direction, scatter.a);
-            state.direct += weight * scatter.rgb * light;
         }
-        state.emission += weight * emission;
+        vec3 through = exp(-m.sigma_t * dt);
+        vec3 weight = state.transmittance * step_weight(m.sigma_t, through, dt);
+        if (frame.sky_dims.w != 0) {
+            if (t >= sky_next) {
+                sky = sky_scatter(ray.origin + ray.direction * t, -ray.direction, m.g);
+                sky_next = t + sky_every;
+            }
+            state.direct += weight * m.sigma_s * sky;
+        }
+        state.emission += weight * m.emission;
         state.transmittance *= through;
-        // What is left behind could no longer be told from black.
-        if (max(max(state.transmittance.r, state.transmittance.g), state.transmittance.b) < 1e-4) {
+        if (is_black(state.transmittance)) {
             state.transmittance = vec3(0.0);
             return;
         }

@@ -25,13 +25,13 @@ void main()
     for (uint i = 0u; i < frame.world.y; ++i) {
         gpu_light_sample s = light_samples[frame.world.x + i];
         vec3 towards = s.position.xyz;
-        float lit = world_shadow(s, p, vec3(0.0), false);
-        if (lit == 0.0)
+        int layer = int(s.position.w);
+        if (layer >= 0 && shadow_test(shadow_views[layer], layer, p, 0.0, false) == 0.0)
             continue;
         vec3 tau = fog_tau(p, towards, 1e30);
         if (medium_exists())
-            tau += medium_tau(p, towards, 1e30, step_length);
-        vec3 light = s.weight.rgb * exp(-tau) * lit;
+            tau += medium_tau(p, towards, 1e30, step_length, 0.5);
+        vec3 light = s.weight.rgb * exp(-tau);
         // Y_0 = sqrt(1 / 4 pi), Y_1 = sqrt(3 / 4 pi) (y, z, x); kept as mean and flux vector:
         // the constants are put back in sky_scatter().
         vec4 basis = vec4(1.0, -towards);

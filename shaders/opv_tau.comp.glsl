@@ -17,10 +17,10 @@ layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D tau_image;
 vec3 depth_towards(gpu_light light, vec3 point, vec3 p)
 {
     if (light.info.x == uint(LIGHT_SUN))
-        return medium_tau(p, point, 1e30, frame.medium_lower.w);
+        return medium_tau(p, point, 1e30, frame.medium_lower.w, 0.5);
     vec3 v = point - p;
     float distance = max(length(v), 1e-9);
-    return medium_tau(p, v / distance, distance, frame.medium_lower.w);
+    return medium_tau(p, v / distance, distance, frame.medium_lower.w, 0.5);
 }
 
 void main()

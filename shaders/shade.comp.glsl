@@ -36,18 +36,19 @@ vec3 light_surface(surface s, vec3 p, gpu_light light, ivec2 pixel, uint number)
     if (radiance == vec3(0.0))
         return radiance;
     float distance = light.info.x == uint(LIGHT_SUN) ? 1e30 : sqrt(square);
-    float lit = light_shadow(light, light_sample, p, s.normal, true);
+    float lit = light_shadow(light, light_sample, p, s.normal);
     if (lit == 0.0)
         return vec3(0.0);
     return radiance * lit * light_transmittance(light, p, towards, distance);
 }
 
-// What the media between a point and the world's sample let through.
-vec3 world_transmittance(vec3 p, vec3 towards)
+// What the media between a point and the world's sample let through. Wide steps, shifted by lot so
+// that they leave no pattern.
+vec3 world_transmittance(vec3 p, vec3 towards, float within)
 {
     vec3 tau = fog_tau(p, towards, 1e30);
     if (medium_exists())
-        tau += medium_tau(p, towards, 1e30, 4.0 * frame.medium_lower.w);
+        tau += medium_tau(p, towards, 1e30, 4.0 * frame.medium_lower.w, within);
     return exp(-tau);
 }
 
@@ -57,20 +58,25 @@ vec3 world_surface(surface s, vec3 p, ivec2 pixel)
     float seen = 0.0, seen_weight = 0.0;
     vec3 mirror = reflect(-s.view, s.normal);
     bool glossy = s.specular != vec3(0.0);
-    uint start = uint(frame.size.z) * frame.world.z + pixel_hash(pixel, 7u);
+    float within = pixel_random(pixel, 8u);
+    // A pixel's samples take every stride-th direction, which are spread as evenly as all are, from
+    // a start of its own: what a few directions do not resolve becomes grain rather than bands.
+    uint stride = max(frame.world.y / (frame.world.z * uint(frame.clip.w)), 1u);
+    uint start = pixel_hash(pixel, 7u);
     for (uint i = 0u; i < frame.world.z; ++i) {
-        gpu_light_sample w = light_samples[frame.world.x + (start + i) % frame.world.y];
+        uint turn = start + (uint(frame.size.z) * frame.world.z + i) * stride;
+        gpu_light_sample w = light_samples[frame.world.x + turn % frame.world.y];
         vec3 towards = w.position.xyz;
         float cosine = dot(s.normal, towards);
         if (cosine <= 0.0)
             continue;
-        float lit = world_shadow(w, p, s.normal, true);
+        float lit = world_shadow(w, p, s.normal);
         float nearness = glossy ? pow(max(dot(mirror, towards), 0.0), 4.0) + 1e-3 : 0.0;
         seen += lit * nearness;
         seen_weight += nearness;
         if (lit > 0.0)
             diffuse += bsdf_diffuse(s, towards) * w.weight.rgb * lit *
-                       world_transmittance(p, towards);
+                       world_transmittance(p, towards, within);
     }
     diffuse *= float(frame.world.y) / float(frame.world.z);
     vec3 specular = vec3(0.0);
@@ -80,7 +86,7 @@ vec3 world_surface(surface s, vec3 p, ivec2 pixel)
         float levels = frame.world_color.w != 0.0 ? float(textureQueryLevels(world_image)) : 1.0;
         float visible = seen_weight > 0.0 ? seen / seen_weight : 0.0;
         specular = world_radiance(mirror, s.roughness * (levels - 2.0)) * bsdf_environment(s) *
-                   visible * world_transmittance(p, mirror);
+                   visible * world_transmittance(p, mirror, within);
     }
     return diffuse + specular;
 }

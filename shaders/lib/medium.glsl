@@ -31,9 +31,15 @@ float medium_skip(vec3 p, vec3 direction)
     return max(min(t.x, min(t.y, t.z)), 0.0);
 }
 
-// Optical depth of the lattice from the origin along a unit direction; midpoint rule, exact where
-// the medium is homogeneous.
-vec3 medium_tau(vec3 origin, vec3 direction, float t_max, float step_length)
+// How many of the steps that follow number k, at `within` of it, lie wholly in an empty brick.
+int medium_steps_to_skip(float skip, float dt, float within)
+{
+    return max(int(skip / dt + within) - 1, 0);
+}
+
+// Optical depth of the lattice from the origin along a unit direction, each step seen at `within`
+// of its length (1/2 is the midpoint rule). Exact where the medium is homogeneous.
+vec3 medium_tau(vec3 origin, vec3 direction, float t_max, float step_length, float within)
 {
     vec2 span = ray_box(origin, direction, frame.medium_lower.xyz, frame.medium_upper.xyz);
     float t0 = max(span.x, 0.0);
@@ -44,10 +50,10 @@ vec3 medium_tau(vec3 origin, vec3 direction, float t_max, float step_length)
     int count = max(int(ceil((t1 - t0) / step_length)), 1);
     float dt = (t1 - t0) / float(count);
     for (int k = 0; k < count; ++k) {
-        vec3 p = origin + direction * (t0 + (float(k) + 0.5) * dt);
+        vec3 p = origin + direction * (t0 + (float(k) + within) * dt);
         float skip = medium_skip(p, direction);
         if (skip > 0.0)
-            k += int(skip / dt);
+            k += medium_steps_to_skip(skip, dt, within);
         else
             tau += textureLod(medium_extinct, medium_coordinate(p), 0.0).rgb * dt;
     }

@@ -19,9 +19,8 @@ float shadow_distance(gpu_shadow_view view, float depth)
 
 // The share of a light sample that geometry lets through to p: one texel (soft false) or a
 // bilinear comparison of four.
-float shadow_layer(int layer, vec3 p, float bias, bool soft)
+float shadow_test(gpu_shadow_view view, int layer, vec3 p, float bias, bool soft)
 {
-    gpu_shadow_view view = shadow_views[layer];
     vec4 clip = view.clip_from_world * vec4(p, 1.0);
     if (clip.w <= 0.0)
         return 1.0;
@@ -67,40 +66,43 @@ int shadow_face(gpu_light light, vec3 v)
     return q.y > 0.0 ? 3 : 4;
 }
 
-// A surface passes its normal and moves the look-up off itself by the texel's size; p in a medium
-// passes zero.
-float light_shadow(gpu_light light, gpu_light_sample s, vec3 p, vec3 normal, bool soft)
+// A surface moves the look-up off itself along its normal by the texel's size. The slope's share of
+// the bias is bounded: at grazing light the offset along the normal does the rest.
+float shadow_surface(gpu_shadow_view view, int layer, vec3 p, float texel, vec3 normal,
+                     vec3 towards)
 {
-    if (s.position.w < 0.0)
-        return 1.0;
-    int layer = int(s.position.w);
-    float texel;
-    vec3 v = light.info.x == uint(LIGHT_SUN) ? -s.position.xyz : p - s.position.xyz;
-    if (light.info.x != uint(LIGHT_SUN)) {
-        int face = shadow_face(light, v);
-        if (face >= int(light.samples.z))
-            return 1.0; // behind an area light, which sends nothing there
-        layer += face;
-        texel = shadow_views[layer].range.w * length(v);
-    } else {
-        texel = shadow_views[layer].range.w;
-    }
-    // The slope's share of the bias is bounded: at grazing light the offset along the normal does
-    // the rest.
-    float cosine = clamp(dot(normal, -normalize(v)), 0.05, 1.0);
+    float cosine = clamp(dot(normal, towards), 0.05, 1.0);
     float slope = min(sqrt(1.0 - cosine * cosine) / cosine, 4.0);
-    float on_surface = dot(normal, normal) > 0.0 ? 1.0 : 0.0;
-    return shadow_layer(layer, p + normal * texel, on_surface * texel * (0.5 + 0.5 * slope), soft);
+    return shadow_test(view, layer, p + normal * texel, texel * (0.5 + 0.5 * slope), true);
 }
 
-float world_shadow(gpu_light_sample s, vec3 p, vec3 normal, bool soft)
+// The layer of a light's sample that sees p, -1 where nothing can stand between.
+int shadow_layer(gpu_light light, gpu_light_sample s, vec3 p)
+{
+    if (s.position.w < 0.0)
+        return -1;
+    int face = light.info.x == uint(LIGHT_SUN) ? 0 : shadow_face(light, p - s.position.xyz);
+    // No map looks behind an area light, which sends nothing there.
+    return face < int(light.samples.z) ? int(s.position.w) + face : -1;
+}
+
+float light_shadow(gpu_light light, gpu_light_sample s, vec3 p, vec3 normal)
+{
+    int layer = shadow_layer(light, s, p);
+    if (layer < 0)
+        return 1.0;
+    gpu_shadow_view view = shadow_views[layer];
+    bool sun = light.info.x == uint(LIGHT_SUN);
+    vec3 v = sun ? s.position.xyz : s.position.xyz - p;
+    float distance = sun ? 1.0 : length(v);
+    return shadow_surface(view, layer, p, view.range.w * distance, normal, v / distance);
+}
+
+float world_shadow(gpu_light_sample s, vec3 p, vec3 normal)
 {
     if (s.position.w < 0.0)
         return 1.0;
     int layer = int(s.position.w);
-    float texel = shadow_views[layer].range.w;
-    float cosine = clamp(dot(normal, s.position.xyz), 0.05, 1.0);
-    float slope = min(sqrt(1.0 - cosine * cosine) / cosine, 4.0);
-    float on_surface = dot(normal, normal) > 0.0 ? 1.0 : 0.0;
-    return shadow_layer(layer, p + normal * texel, on_surface * texel * (0.5 + 0.5 * slope), soft);
+    gpu_shadow_view view = shadow_views[layer];
+    return shadow_surface(view, layer, p, view.range.w, normal, s.position.xyz);
 }

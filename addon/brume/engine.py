@@ -122,10 +122,13 @@ class BrumeEngine(bpy.types.RenderEngine):
         self.update_progress(1.0)
 
     def _warn(self, entries):
-        """Reports what is not shown; in background, where reports are not seen, in print."""
+        """Reports what is not shown; in background, where reports are not seen, in print. The
+        scene of a preview is Blender's own, and no concern of the user's."""
+        if self.is_preview:
+            return
         for _, sentence in entries:
             self.report({'WARNING'}, sentence)
-            if bpy.app.background and not self.is_preview:
+            if bpy.app.background:
                 print(f"Brume: warning: {sentence}", flush=True)
 
     def _finish(self, depsgraph, stats, export_s, whole_s):

@@ -365,6 +365,38 @@ def test_fluid_color_is_not_multiplied_by_density(plume, export):
     assert 0.0 < color.maximum <= 1.01
 
 
+def test_adaptive_domain_with_noise(scene, tmp_path, monkeypatch, export):
+    """The grids of a domain that shrinks around its smoke lie where the smoke's source is."""
+    from brume.export import fluid
+    domain = cube("Domain", size=2.0, location=(0, 0, 1), material=smoke())
+    modifier = domain.modifiers.new("Fluid", 'FLUID')
+    modifier.fluid_type = 'DOMAIN'
+    settings = modifier.domain_settings
+    settings.domain_type, settings.resolution_max = 'GAS', 16
+    settings.use_adaptive_domain = settings.use_noise = True
+    settings.cache_type, settings.cache_directory = 'REPLAY', str(tmp_path)
+    source = cube("Source", size=0.3, location=(0.5, -0.4, 0.6))
+    flow = source.modifiers.new("Fluid", 'FLUID')
+    flow.fluid_type = 'FLOW'
+    flow.flow_settings.flow_behavior = 'INFLOW'
+    grids = []
+    create = fluid.Grid.create
+    monkeypatch.setattr(fluid.Grid, "create", lambda name, data, to_object: (
+        grids.append((data, to_object)), create(name, data, to_object))[1])
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+    export()
+    (density, to_object), = grids
+    cells = density.shape[::-1]
+    assert max(cells) < 2 * 16, "the domain has not shrunk"
+    x, y, z = np.meshgrid(*[np.arange(n) + 0.5 for n in cells], indexing='ij')
+    weight = density.transpose(2, 1, 0)
+    centre = [(axis * weight).sum() / weight.sum() for axis in (x, y, z)]
+    # A cell of the coarse grid is an eighth of a metre, and smoke has begun to rise.
+    np.testing.assert_allclose((np.array(domain.matrix_world) @ to_object @ (*centre, 1))[:3],
+                               (0.5, -0.4, 0.6), atol=0.13)
+
+
 # -- the rest
 
 

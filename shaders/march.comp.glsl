@@ -107,10 +107,6 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, vec2 span, int co
     gpu_light light = lights[number];
     uint turn = (uint(frame.size.z) + pixel_hash(pixel, number)) % light.samples.y;
     gpu_light_sample light_sample = light_samples[light.samples.x + turn];
-    gpu_shadow_view view;
-    bool one_view = light.samples.z == 1u && light_sample.position.w >= 0.0;
-    if (one_view)
-        view = shadow_views[int(light_sample.position.w)];
     bool sun = light.info.x == uint(LIGHT_SUN);
     float along = dot(light_sample.position.xyz - ray.origin, ray.direction);
     float dt = (span.y - span.x) / float(count);
@@ -130,18 +126,11 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, vec2 span, int co
         vec3 towards;
         float square;
         vec3 light_here = light_intensity(light, light_sample.position.xyz, p, towards, square);
+        float distance = sun ? 1e30 : sqrt(square);
+        if (light_here != vec3(0.0))
+            light_here *= light_shadow_medium(light, light_sample, p, distance);
         if (light_here != vec3(0.0)) {
-            int layer = one_view ? int(light_sample.position.w) : shadow_layer(light, light_sample, p);
-            if (layer >= 0) {
-                if (!one_view)
-                    view = shadow_views[layer];
-                light_here *= shadow_test(view, layer, p, 0.0, false);
-            }
-        }
-        if (light_here != vec3(0.0)) {
-            float distance = 1e30;
             if (!sun) {
-                distance = sqrt(square);
                 float h = sqrt(max(square - (along - t) * (along - t), 1e-8));
                 light_here *= mean_inverse_square(t0 - along, t0 + dt - along, h);
             }

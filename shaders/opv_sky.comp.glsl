@@ -26,7 +26,7 @@ void main()
         gpu_light_sample s = light_samples[frame.world.x + i];
         vec3 towards = s.position.xyz;
         int layer = int(s.position.w);
-        if (layer >= 0 && shadow_test(shadow_views[layer], layer, p, 0.0, false) == 0.0)
+        if (layer >= 0 && distant_shadow_medium(layer, frame.world.w, p) == 0.0)
             continue;
         vec3 tau = fog_tau(p, towards, 1e30);
         if (medium_exists())

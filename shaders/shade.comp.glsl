@@ -70,7 +70,9 @@ vec3 world_surface(surface s, vec3 p, ivec2 pixel)
         float cosine = dot(s.normal, towards);
         if (cosine <= 0.0)
             continue;
-        float lit = world_shadow(w, p, s.normal);
+        float lit = w.position.w < 0.0 ? 1.0
+                                       : distant_shadow(int(w.position.w), frame.world.w, p,
+                                                        s.normal, towards);
         float nearness = glossy ? pow(max(dot(mirror, towards), 0.0), 4.0) + 1e-3 : 0.0;
         seen += lit * nearness;
         seen_weight += nearness;

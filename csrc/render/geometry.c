@@ -203,12 +203,22 @@ static brume_result sync_materials(struct gpu *gpu, struct geometry *geometry,
 
 /* --- Instances and draws ------------------------------------------------------------------ */
 
-static void grow(struct geometry *geometry, const float lower[3], const float upper[3])
+static void grow(float lower[3], float upper[3], const float add_lower[3], const float add_upper[3])
 {
     for (int i = 0; i < 3; ++i) {
-        geometry->lower[i] = fminf(geometry->lower[i], lower[i]);
-        geometry->upper[i] = fmaxf(geometry->upper[i], upper[i]);
+        lower[i] = fminf(lower[i], add_lower[i]);
+        upper[i] = fmaxf(upper[i], add_upper[i]);
     }
+}
+
+static int is_flat(const struct mesh_block *mesh)
+{
+    float thinnest = INFINITY, longest = 0.0f;
+    for (int i = 0; i < 3; ++i) {
+        thinnest = fminf(thinnest, mesh->upper[i] - mesh->lower[i]);
+        longest = fmaxf(longest, mesh->upper[i] - mesh->lower[i]);
+    }
+    return thinnest < 1e-3f * longest;
 }
 
 static void write_instance(struct gpu_instance *out, const float *world_from_object,
@@ -272,8 +282,8 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
     geometry->draw_count = 0;
     geometry->triangle_count = 0;
     for (int i = 0; i < 3; ++i) {
-        geometry->lower[i] = INFINITY;
-        geometry->upper[i] = -INFINITY;
+        geometry->lower[i] = geometry->solid_lower[i] = INFINITY;
+        geometry->upper[i] = geometry->solid_upper[i] = -INFINITY;
     }
     brume_result result = BRUME_OK;
     if (!instances || !numbers || !geometry->draws)
@@ -294,7 +304,9 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
             const float *matrix = set->world_from_object + 16 * (size_t)k;
             float lower[3], upper[3];
             mat4_bounds(matrix, mesh->lower, mesh->upper, lower, upper);
-            grow(geometry, lower, upper);
+            grow(geometry->lower, geometry->upper, lower, upper);
+            if (!is_flat(mesh))
+                grow(geometry->solid_lower, geometry->solid_upper, lower, upper);
             write_instance(&instances[next], matrix, set->visibility);
             numbers[next] = next;
             ++next;

@@ -41,6 +41,8 @@ struct geometry {
     GLuint vertex_array;
     uint32_t triangle_count;      /* instances counted */
     float lower[3], upper[3];     /* of everything drawn; lower > upper when empty */
+    /* Of all but flat meshes: what a ground plane, however wide, leaves for sharp shadows. */
+    float solid_lower[3], solid_upper[3];
 };
 
 brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,

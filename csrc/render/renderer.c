@@ -123,7 +123,8 @@ static void set_world(struct run *run)
         mat4_identity(frame->image_from_world.m);
     const uint32_t count = renderer->shadows.world_count;
     const uint32_t samples = run->request->view.samples;
-    frame->world = (uvec4){renderer->shadows.world_first, count, (count + samples - 1) / samples, 0};
+    frame->world = (uvec4){renderer->shadows.world_first, count, (count + samples - 1) / samples,
+                           renderer->shadows.world_faces};
     frame->counts = (uvec4){renderer->shadows.light_count, (uint32_t)renderer->shadows.side, 0, 0};
     glBindTextureUnit(SLOT_WORLD, image ? image->texture.id : 0);
 }

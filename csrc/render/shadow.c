@@ -24,21 +24,24 @@ static float radius_of(const struct geometry *geometry, float center[3])
     return sqrtf(square);
 }
 
-/* A map along `towards` (unit, to the light) that holds all geometry. */
-static void orthographic_view(const struct geometry *geometry, const vec4 *towards, int side,
+/* A map along `towards` (unit, to the light) over the box from lower to upper, with the depths of
+ * all geometry. */
+static void orthographic_view(const struct geometry *geometry, const float lower[3],
+                              const float upper[3], const vec4 *towards, int side,
                               struct gpu_shadow_view *out)
 {
-    float center[3], view[16], projection[16], lower[3], upper[3];
+    float center[3], view[16], projection[16], low[3], high[3], all_low[3], all_high[3];
     const float radius = fmaxf(radius_of(geometry, center), 1e-4f);
     const float direction[3] = {-towards->x, -towards->y, -towards->z};
     const float eye[3] = {center[0] - direction[0] * radius, center[1] - direction[1] * radius,
                           center[2] - direction[2] * radius};
     mat4_look(eye, direction, view);
-    mat4_bounds(view, geometry->lower, geometry->upper, lower, upper);
+    mat4_bounds(view, lower, upper, low, high);
+    mat4_bounds(view, geometry->lower, geometry->upper, all_low, all_high);
     /* Square texels, and a texel of room for the filter at the rim. */
-    const float width = fmaxf(upper[0] - lower[0], upper[1] - lower[1]) * (1.0f + 4.0f / (float)side);
-    const float x = 0.5f * (lower[0] + upper[0]), y = 0.5f * (lower[1] + upper[1]);
-    const float near_ = -upper[2] - 1e-3f * radius, far_ = -lower[2] + 1e-3f * radius;
+    const float width = fmaxf(high[0] - low[0], high[1] - low[1]) * (1.0f + 4.0f / (float)side);
+    const float x = 0.5f * (low[0] + high[0]), y = 0.5f * (low[1] + high[1]);
+    const float near_ = -all_high[2] - 1e-3f * radius, far_ = -all_low[2] + 1e-3f * radius;
     mat4_orthographic(x - 0.5f * width, x + 0.5f * width, y - 0.5f * width, y + 0.5f * width, near_,
                       far_, projection);
     /* Reversed depth: 1 at near, 0 at far. */
@@ -48,6 +51,29 @@ static void orthographic_view(const struct geometry *geometry, const vec4 *towar
     projection[14] = far_ / (far_ - near_);
     mat4_multiply(projection, view, out->clip_from_world.m);
     out->range = (vec4){1.0f, near_, far_, width / (float)side};
+}
+
+/* Maps of a distant light: over all geometry, and before it a finer one over what is solid where
+ * that is much smaller (a house on a wide plain). */
+static uint32_t distant_faces(const struct geometry *geometry)
+{
+    float all = 0.0f, solid = 0.0f;
+    for (int i = 0; i < 3; ++i) {
+        const float a = geometry->upper[i] - geometry->lower[i];
+        const float s = geometry->solid_upper[i] - geometry->solid_lower[i];
+        all += a * a;
+        solid += s * s;
+    }
+    return geometry->solid_lower[0] <= geometry->solid_upper[0] && solid < 0.25f * all ? 2 : 1;
+}
+
+static void distant_views(const struct geometry *geometry, uint32_t faces, const vec4 *towards,
+                          int side, struct gpu_shadow_view *out)
+{
+    if (faces == 2)
+        orthographic_view(geometry, geometry->solid_lower, geometry->solid_upper, towards, side,
+                          out++);
+    orthographic_view(geometry, geometry->lower, geometry->upper, towards, side, out);
 }
 
 static void perspective_view(const float eye[3], const float direction[3], float tangent, int side,
@@ -89,18 +115,32 @@ static void lamp_views(const brume_light *light, const struct gpu_light *gpu,
 
 /* --- Layout ------------------------------------------------------------------------------- */
 
-static brume_result allocate(struct shadows *shadows, const struct snapshot *snapshot,
-                             uint32_t light_samples, uint32_t world_samples_)
+static uint32_t faces_of(const brume_light *light, uint32_t distant)
+{
+    return light->type == BRUME_LIGHT_SUN ? distant : light_faces(light);
+}
+
+static uint32_t layer_count(const struct snapshot *snapshot, uint32_t samples, uint32_t world,
+                            uint32_t distant)
 {
     const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
-    uint32_t samples = world_samples_, layers = world_samples_;
+    uint32_t layers = world * distant;
     for (uint32_t i = 0; i < table->count; ++i) {
         const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
-        const uint32_t count = light_sample_count(light, light_samples);
-        samples += count;
         if (light->cast_shadow)
-            layers += count * light_faces(light);
+            layers += light_sample_count(light, samples) * faces_of(light, distant);
     }
+    return layers;
+}
+
+static brume_result allocate(struct shadows *shadows, const struct snapshot *snapshot,
+                             uint32_t light_samples, uint32_t world, uint32_t layers)
+{
+    const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
+    uint32_t samples = world;
+    for (uint32_t i = 0; i < table->count; ++i)
+        samples += light_sample_count(&((struct light_block *)table->entries[i].block)->light,
+                                      light_samples);
     free(shadows->lights);
     free(shadows->samples);
     free(shadows->views);
@@ -113,18 +153,6 @@ static brume_result allocate(struct shadows *shadows, const struct snapshot *sna
     if (!shadows->lights || !shadows->samples || !shadows->views)
         return fail(BRUME_E_MEMORY, "no memory for %u lights", table->count);
     return BRUME_OK;
-}
-
-static uint32_t layer_count(const struct snapshot *snapshot, uint32_t samples, uint32_t world)
-{
-    const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
-    uint32_t layers = world;
-    for (uint32_t i = 0; i < table->count; ++i) {
-        const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
-        if (light->cast_shadow)
-            layers += light_sample_count(light, samples) * light_faces(light);
-    }
-    return layers;
 }
 
 static int world_is_black(const brume_world *world)
@@ -146,13 +174,14 @@ brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
         world_count = (uint32_t)settings->world_samples;
     const int casters = geometry->lower[0] <= geometry->upper[0];
 
-    while (wanted > 1 && layer_count(snapshot, wanted, world_count) > MAX_LAYERS)
+    const uint32_t distant = casters ? distant_faces(geometry) : 1;
+    while (wanted > 1 && layer_count(snapshot, wanted, world_count, distant) > MAX_LAYERS)
         wanted /= 2;
     if (wanted < (uint32_t)settings->light_samples)
         job_warn(control, "LIGHT_SAMPLES_FEWER",
                  "%u shadow maps a lamp instead of %d: more than %d do not fit", wanted,
                  settings->light_samples, MAX_LAYERS);
-    const uint32_t layers = layer_count(snapshot, wanted, world_count);
+    const uint32_t layers = layer_count(snapshot, wanted, world_count, distant);
     if (layers > MAX_LAYERS)
         return fail(BRUME_E_UNSUPPORTED, "%u lamps need more than %d shadow maps",
                     snapshot->tables[BRUME_KIND_LIGHT].count, MAX_LAYERS);
@@ -163,8 +192,9 @@ brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
         job_warn(control, "SHADOWS_COARSER",
                  "shadow maps of %d instead of %d texels, to keep the memory budget", side,
                  settings->shadow_resolution);
-    TRY(allocate(shadows, snapshot, wanted, world_count));
+    TRY(allocate(shadows, snapshot, wanted, world_count, layers));
     shadows->side = side;
+    shadows->world_faces = distant;
 
     const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
     uint32_t next_sample = 0, next_layer = 0;
@@ -174,7 +204,8 @@ brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
         light_to_gpu(light, out);
         if (light->type == BRUME_LIGHT_SUN && !distant_light)
             out->radiance = (vec4){0};
-        const uint32_t count = light_sample_count(light, wanted), faces = light_faces(light);
+        const uint32_t count = light_sample_count(light, wanted);
+        const uint32_t faces = faces_of(light, distant);
         out->samples.x = next_sample;
         out->samples.y = count;
         out->samples.z = faces;
@@ -185,7 +216,8 @@ brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
                 continue;
             sample->position.w = (float)next_layer;
             if (light->type == BRUME_LIGHT_SUN)
-                orthographic_view(geometry, &sample->position, side, &shadows->views[next_layer]);
+                distant_views(geometry, faces, &sample->position, side,
+                              &shadows->views[next_layer]);
             else
                 lamp_views(light, out, sample, geometry, side, &shadows->views[next_layer]);
             next_layer += faces;
@@ -204,7 +236,8 @@ brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
         for (uint32_t s = 0; s < world_count && casters; ++s) {
             struct gpu_light_sample *sample = &shadows->samples[next_sample + s];
             sample->position.w = (float)next_layer;
-            orthographic_view(geometry, &sample->position, side, &shadows->views[next_layer++]);
+            distant_views(geometry, distant, &sample->position, side, &shadows->views[next_layer]);
+            next_layer += distant;
         }
     }
     shadows->view_count = next_layer;

@@ -12,6 +12,7 @@ struct shadows {
     struct gpu_shadow_view *views;
     uint32_t light_count, sample_count, view_count;
     uint32_t world_first, world_count; /* samples */
+    uint32_t world_faces;              /* maps a sample of the world */
     int side;                          /* texels */
     struct buffer light_buffer, sample_buffer, view_buffer;
     struct texture maps;

@@ -17,16 +17,18 @@ float shadow_distance(gpu_shadow_view view, float depth)
     return view.range.y / max(depth, 1e-30);
 }
 
+const float SHADOW_OUTSIDE = -1.0;
+
 // The share of a light sample that geometry lets through to p: one texel (soft false) or a
-// bilinear comparison of four.
+// bilinear comparison of four. SHADOW_OUTSIDE where the map does not reach.
 float shadow_test(gpu_shadow_view view, int layer, vec3 p, float bias, bool soft)
 {
     vec4 clip = view.clip_from_world * vec4(p, 1.0);
     if (clip.w <= 0.0)
-        return 1.0;
+        return SHADOW_OUTSIDE;
     vec2 uv = clip.xy / clip.w * 0.5 + 0.5;
     if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0))))
-        return 1.0;
+        return SHADOW_OUTSIDE;
     float distance_here = view.range.x != 0.0
                               ? view.range.z - clip.z * (view.range.z - view.range.y)
                               : clip.w;
@@ -45,11 +47,18 @@ float shadow_test(gpu_shadow_view view, int layer, vec3 p, float bias, bool soft
     return mix(mix(lit.w, lit.z, f.x), mix(lit.x, lit.y, f.x), f.y);
 }
 
+// A point of a medium has no normal to step off along: near a surface it stays clear of the depths
+// that a texel of the map rounds.
+float shadow_medium(gpu_shadow_view view, int layer, vec3 p, float distance)
+{
+    return shadow_test(view, layer, p, 1.5 * view.range.w * distance, false);
+}
+
 // The layer that sees along v (from the light), by the light's faces.
 int shadow_face(gpu_light light, vec3 v)
 {
     if (light.samples.z == 1u)
-        return 0;
+        return 0; // a spot's one map
     vec3 forward = light.axis.xyz;
     // Same frame as frame_around() of csrc/math/frame.cpp.
     float s = forward.z >= 0.0 ? 1.0 : -1.0;
@@ -68,41 +77,60 @@ int shadow_face(gpu_light light, vec3 v)
 
 // A surface moves the look-up off itself along its normal by the texel's size. The slope's share of
 // the bias is bounded: at grazing light the offset along the normal does the rest.
-float shadow_surface(gpu_shadow_view view, int layer, vec3 p, float texel, vec3 normal,
-                     vec3 towards)
+float shadow_surface(int layer, vec3 p, float distance, vec3 normal, vec3 towards)
 {
+    gpu_shadow_view view = shadow_views[layer];
+    float texel = view.range.w * distance;
     float cosine = clamp(dot(normal, towards), 0.05, 1.0);
     float slope = min(sqrt(1.0 - cosine * cosine) / cosine, 4.0);
     return shadow_test(view, layer, p + normal * texel, texel * (0.5 + 0.5 * slope), true);
 }
 
-// The layer of a light's sample that sees p, -1 where nothing can stand between.
-int shadow_layer(gpu_light light, gpu_light_sample s, vec3 p)
+// Distant lights have one map, or a fine one before a wide one.
+float distant_shadow(int layer, uint maps, vec3 p, vec3 normal, vec3 towards)
 {
-    if (s.position.w < 0.0)
-        return -1;
-    int face = light.info.x == uint(LIGHT_SUN) ? 0 : shadow_face(light, p - s.position.xyz);
+    float lit = shadow_surface(layer, p, 1.0, normal, towards);
+    if (lit == SHADOW_OUTSIDE && maps == 2u)
+        lit = shadow_surface(layer + 1, p, 1.0, normal, towards);
+    return abs(lit); // beyond all geometry: lit
+}
+
+float distant_shadow_medium(int layer, uint maps, vec3 p)
+{
+    float lit = shadow_medium(shadow_views[layer], layer, p, 1.0);
+    if (lit == SHADOW_OUTSIDE && maps == 2u)
+        lit = shadow_medium(shadow_views[layer + 1], layer + 1, p, 1.0);
+    return abs(lit);
+}
+
+// The layer of a lamp's sample that sees p, -1 where nothing can stand between.
+int lamp_layer(gpu_light light, gpu_light_sample s, vec3 p)
+{
+    int face = shadow_face(light, p - s.position.xyz);
     // No map looks behind an area light, which sends nothing there.
     return face < int(light.samples.z) ? int(s.position.w) + face : -1;
 }
 
 float light_shadow(gpu_light light, gpu_light_sample s, vec3 p, vec3 normal)
 {
-    int layer = shadow_layer(light, s, p);
+    if (s.position.w < 0.0)
+        return 1.0;
+    if (light.info.x == uint(LIGHT_SUN))
+        return distant_shadow(int(s.position.w), light.samples.z, p, normal, s.position.xyz);
+    int layer = lamp_layer(light, s, p);
     if (layer < 0)
         return 1.0;
-    gpu_shadow_view view = shadow_views[layer];
-    bool sun = light.info.x == uint(LIGHT_SUN);
-    vec3 v = sun ? s.position.xyz : s.position.xyz - p;
-    float distance = sun ? 1.0 : length(v);
-    return shadow_surface(view, layer, p, view.range.w * distance, normal, v / distance);
+    vec3 v = s.position.xyz - p;
+    float distance = length(v);
+    return abs(shadow_surface(layer, p, distance, normal, v / distance));
 }
 
-float world_shadow(gpu_light_sample s, vec3 p, vec3 normal)
+float light_shadow_medium(gpu_light light, gpu_light_sample s, vec3 p, float distance)
 {
     if (s.position.w < 0.0)
         return 1.0;
-    int layer = int(s.position.w);
-    gpu_shadow_view view = shadow_views[layer];
-    return shadow_surface(view, layer, p, view.range.w, normal, s.position.xyz);
+    if (light.info.x == uint(LIGHT_SUN))
+        return distant_shadow_medium(int(s.position.w), light.samples.z, p);
+    int layer = lamp_layer(light, s, p);
+    return layer < 0 ? 1.0 : abs(shadow_medium(shadow_views[layer], layer, p, distance));
 }

@@ -100,20 +100,20 @@ float step_jitter(float jitter, int k)
     return fract(jitter + float(k) * 0.754877666);
 }
 
-// What one lamp adds along the stretch. Lamps are the outer loop: their data are read once a ray.
-vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, vec2 span, int count,
-                bool in_lattice, ivec2 pixel, float jitter)
+// What one lamp adds along the steps from first to end, which start at t_start. Lamps are the outer
+// loop: their data are read once a ray.
+vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, float dt, int first,
+                int end, bool in_lattice, ivec2 pixel, float jitter)
 {
     gpu_light light = lights[number];
     uint turn = (uint(frame.size.z) + pixel_hash(pixel, number)) % light.samples.y;
     gpu_light_sample light_sample = light_samples[light.samples.x + turn];
     bool sun = light.info.x == uint(LIGHT_SUN);
     float along = dot(light_sample.position.xyz - ray.origin, ray.direction);
-    float dt = (span.y - span.x) / float(count);
     vec3 sum = vec3(0.0);
-    for (int k = 0; k < count; ++k) {
+    for (int k = first; k < end; ++k) {
         float within = step_jitter(jitter, k);
-        float t0 = span.x + float(k) * dt;
+        float t0 = t_start + float(k) * dt;
         float t = t0 + within * dt;
         medium_step m;
         int skipped;
@@ -139,24 +139,21 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, vec2 span, int co
                     light_transmittance(light, p, towards, distance));
         }
         transmittance *= through;
-        if (is_black(transmittance))
-            break;
     }
     return sum * light.factors.z;
 }
 
-// Transmittance, emission and the world's light along the stretch.
+// Transmittance, emission, the world's light and the lamps' along the stretch.
 void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_lattice,
            ivec2 pixel, float jitter)
 {
-    for (uint i = 0u; i < frame.counts.x; ++i)
-        state.direct += march_lamp(i, state.transmittance, ray, span, count, in_lattice, pixel,
-                                   jitter);
+    vec3 transmittance = state.transmittance;
     float dt = (span.y - span.x) / float(count);
-    // The sky's lattice is much coarser than a step.
+    // The sky's lattice is coarser than a step.
     float sky_every = max(frame.sky_lower.w, dt);
     float sky_next = -1e30;
     vec3 sky = vec3(0.0);
+    int first = count, end = 0; // the steps that are not empty
     for (int k = 0; k < count; ++k) {
         float within = step_jitter(jitter, k);
         float t = span.x + (float(k) + within) * dt;
@@ -166,8 +163,10 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             k += skipped;
             continue;
         }
+        first = min(first, k);
+        end = k + 1;
         vec3 through = exp(-m.sigma_t * dt);
-        vec3 weight = state.transmittance * step_weight(m.sigma_t, through, dt);
+        vec3 weight = transmittance * step_weight(m.sigma_t, through, dt);
         if (frame.sky_dims.w != 0) {
             if (t >= sky_next) {
                 sky = sky_scatter(ray.origin + ray.direction * t, -ray.direction, m.g);
@@ -176,12 +175,17 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             state.direct += weight * m.sigma_s * sky;
         }
         state.emission += weight * m.emission;
-        state.transmittance *= through;
-        if (is_black(state.transmittance)) {
-            state.transmittance = vec3(0.0);
-            return;
+        transmittance *= through;
+        if (is_black(transmittance)) {
+            transmittance = vec3(0.0);
+            break;
         }
     }
+    if (first < end)
+        for (uint i = 0u; i < frame.counts.x; ++i)
+            state.direct += march_lamp(i, state.transmittance, ray, span.x, dt, first, end,
+                                       in_lattice, pixel, jitter);
+    state.transmittance = transmittance;
 }
 
 void march_media(inout march_state state, view_ray ray, float t_near, float t_far, ivec2 pixel)

@@ -91,8 +91,10 @@ static brume_result work_medium(struct run *run)
     for (uint32_t i = 0; i < table->count; ++i)
         volumes[i] = ((struct volume_block *)table->entries[i].block)->volume;
     struct medium_lattice lattice = {0};
+    const int32_t useful = medium_useful_resolution(volumes, table->count);
+    const int32_t wanted = request->settings.medium_resolution;
     brume_result result =
-        medium_build(volumes, table->count, request->settings.medium_resolution,
+        medium_build(volumes, table->count, wanted < useful ? wanted : useful,
                      request->settings.memory_budget / 4 / MEDIUM_CELL_BYTES,
                      job_cancelled_callback, request->control, &lattice);
     free(volumes);

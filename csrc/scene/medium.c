@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* The medium's lattice, summed from its volumes. Any thread, and all cores. */
 #include "scene/medium.h"
+#include "base/field.h"
 #include "base/result.h"
 #include "math/frame.h"
 #include "scene/resample.h"
@@ -30,21 +31,62 @@ static double set_dims(struct medium_lattice *lattice, const double extent[3], d
     return product;
 }
 
+/* The box of all volumes; returns its longest side, 0 without volumes. */
+static double joint_bounds(struct volume *const *volumes, uint32_t count, double lower[3],
+                           double upper[3], double extent[3])
+{
+    double longest = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        lower[axis] = INFINITY;
+        upper[axis] = -INFINITY;
+        for (uint32_t i = 0; i < count; ++i) {
+            lower[axis] = fmin(lower[axis], (double)volumes[i]->lower[axis]);
+            upper[axis] = fmax(upper[axis], (double)volumes[i]->upper[axis]);
+        }
+        extent[axis] = count ? upper[axis] - lower[axis] : 0.0;
+        longest = fmax(longest, extent[axis]);
+    }
+    return longest;
+}
+
+/* Side of the smallest voxel of all volumes, m: cells smaller than that would hold nothing more.
+ * 0 where a mesh gives the medium, whose shape any resolution makes better. */
+static double finest_voxel(struct volume *const *volumes, uint32_t count)
+{
+    double finest = INFINITY;
+    for (uint32_t i = 0; i < count; ++i) {
+        if (volumes[i]->positions)
+            return 0.0;
+        for (uint32_t g = 0; g < volumes[i]->grid_count; ++g) {
+            if (!volumes[i]->grids[g])
+                continue;
+            float m[16];
+            mat4_multiply(volumes[i]->world_from_object,
+                          volumes[i]->grids[g]->info.object_from_array, m);
+            for (int column = 0; column < 3; ++column)
+                finest = fmin(finest, sqrt((double)m[4 * column] * m[4 * column] +
+                                           (double)m[4 * column + 1] * m[4 * column + 1] +
+                                           (double)m[4 * column + 2] * m[4 * column + 2]));
+        }
+    }
+    return finest;
+}
+
+int32_t medium_useful_resolution(struct volume *const *volumes, uint32_t count)
+{
+    double lower[3], upper[3], extent[3];
+    const double longest = joint_bounds(volumes, count, lower, upper, extent);
+    const double voxels = ceil(longest / finest_voxel(volumes, count) - SLIVER);
+    /* Also where a mesh, with voxels of no size, makes it infinite. */
+    return voxels < INT32_MAX ? (int32_t)fmax(voxels, 1.0) : INT32_MAX;
+}
+
 /* Fills all but the arrays; the dims stay 0 if the volumes have no extent. */
 static void place(struct medium_lattice *lattice, struct volume *const *volumes, uint32_t count,
                   int32_t resolution, uint64_t max_cells)
 {
-    double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (uint32_t i = 0; i < count; ++i)
-        for (int axis = 0; axis < 3; ++axis) {
-            lower[axis] = fmin(lower[axis], (double)volumes[i]->lower[axis]);
-            upper[axis] = fmax(upper[axis], (double)volumes[i]->upper[axis]);
-        }
-    double extent[3], longest = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-        extent[axis] = upper[axis] - lower[axis];
-        longest = fmax(longest, extent[axis]);
-    }
+    double lower[3], upper[3], extent[3];
+    const double longest = joint_bounds(volumes, count, lower, upper, extent);
     /* Also false for a box so small that floats have no cells for it. */
     if (count == 0 || !((float)(longest / resolution) > 0.0f))
         return;

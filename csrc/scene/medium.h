@@ -43,6 +43,10 @@ struct medium_lattice {
     bool coarser;                    /* max_cells forced a lower resolution */
 };
 
+/* The resolution at which cells are as small as the smallest voxel of the grids: more cells would
+ * show nothing more. INT32_MAX with a mesh, whose shape any resolution makes better. */
+int32_t medium_useful_resolution(struct volume *const *volumes, uint32_t count);
+
 /* resolution: cells along the longest side of the volumes' joint bounds. max_cells: a limit that
  * makes it coarser. cancelled (may be NULL): polled; a true return ends with BRUME_E_CANCELLED.
  * Values are means over the cell: a lattice coarser than the grid does not lose mass, a finer one

@@ -395,6 +395,26 @@ static void a_finer_lattice_interpolates_linearly(void **state)
     field_release(grid);
 }
 
+static void more_cells_than_voxels_are_of_no_use(void **state)
+{
+    (void)state;
+    float from_array[16], doubled[16];
+    unit_from_array(8, from_array);
+    mat4_identity(doubled);
+    doubled[0] = doubled[5] = doubled[10] = 2.0f;
+    brume_grid *grid = grid_make(8, 4, 2, 1, from_array);
+    struct volume *volumes[2] = {volume_make(grid, &smoke, doubled)};
+    /* Empty outermost voxels add no half voxel to the bounds. */
+    assert_int_equal(medium_useful_resolution(volumes, 1), 8);
+    mat4_identity(doubled);
+    volumes[1] = volume_make(grid, &smoke, doubled);
+    assert_int_equal(medium_useful_resolution(volumes, 2), 16); /* 2 m of voxels of 1/8 m */
+    assert_int_equal(medium_useful_resolution(NULL, 0), 1);
+    volume_release(volumes[0]);
+    volume_release(volumes[1]);
+    field_release(grid);
+}
+
 static void interpolation_reaches_half_a_voxel_beyond(void **state)
 {
     (void)state;
@@ -833,6 +853,7 @@ int main(void)
         cmocka_unit_test(mirrored_turned_and_sheared_grids_keep_the_mass),
         cmocka_unit_test(a_grid_smaller_than_a_cell_keeps_its_mass),
         cmocka_unit_test(a_finer_lattice_interpolates_linearly),
+        cmocka_unit_test(more_cells_than_voxels_are_of_no_use),
         cmocka_unit_test(interpolation_reaches_half_a_voxel_beyond),
         cmocka_unit_test(a_lattice_half_a_cell_off_halves),
         cmocka_unit_test(volumes_add_and_g_is_weighted),

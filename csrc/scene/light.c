@@ -169,6 +169,20 @@ static void disk_point(uint32_t index, uint32_t count, float *x, float *y)
     *y = radius * sinf(angle);
 }
 
+/* Shirley and Chiu, "A Low Distortion Map Between Disk and Square", JGT 1997: keeps areas. As
+ * square_to_disk() of shaders/lib/light.glsl. */
+static void square_to_disk(float *x, float *y)
+{
+    const float a = *x, b = *y;
+    if (a == 0.0f && b == 0.0f)
+        return;
+    const int wide = fabsf(a) > fabsf(b);
+    const float radius = wide ? a : b;
+    const float angle = wide ? 0.25f * PI * (b / a) : 0.5f * PI - 0.25f * PI * (a / b);
+    *x = radius * cosf(angle);
+    *y = radius * sinf(angle);
+}
+
 /* A ball whose projection along any direction is a uniform disk, as Cycles' point lamps look from
  * everywhere: by Abel's inversion the density goes as 1 / sqrt(1 - r^2). With r = sin(t) the
  * cumulated share of radii is (2 t - sin 2t) / pi. */
@@ -208,7 +222,6 @@ void light_sample(const brume_light *light, const struct gpu_light *gpu, uint32_
     memset(out, 0, sizeof *out);
     out->position = gpu->position;
     out->position.w = -1.0f;
-    out->weight.x = 1.0f / (float)count;
     float x, y;
     switch (light->type) {
     case BRUME_LIGHT_SUN: {
@@ -231,26 +244,22 @@ void light_sample(const brume_light *light, const struct gpu_light *gpu, uint32_
         out->position.z += light->radius * offset[2];
         break;
     }
-    case BRUME_LIGHT_RECTANGLE: {
-        /* Strata of about square shape; the shader moves each point within its stratum. */
+    default: {
+        /* Strata of the square [-1, 1]^2, themselves about square; the shader moves each point
+         * within its stratum and, for an ellipse, maps the square to the disk. */
         uint32_t columns = 1;
         while (columns * columns < count || count % columns)
             ++columns;
         const uint32_t rows = count / columns;
         x = 2.0f * ((float)(index % columns) + 0.5f) / (float)columns - 1.0f;
         y = 2.0f * ((float)(index / columns) + 0.5f) / (float)rows - 1.0f;
-        out->weight.y = 1.0f / (float)columns;
-        out->weight.z = 1.0f / (float)rows;
+        out->weight = (vec4){x, y, 1.0f / (float)columns, 1.0f / (float)rows};
+        if (light->type == BRUME_LIGHT_ELLIPSE)
+            square_to_disk(&x, &y);
         out->position.x += x * gpu->tangent.x + y * gpu->bitangent.x;
         out->position.y += x * gpu->tangent.y + y * gpu->bitangent.y;
         out->position.z += x * gpu->tangent.z + y * gpu->bitangent.z;
         break;
     }
-    default:
-        disk_point(index, count, &x, &y);
-        out->position.x += x * gpu->tangent.x + y * gpu->bitangent.x;
-        out->position.y += x * gpu->tangent.y + y * gpu->bitangent.y;
-        out->position.z += x * gpu->tangent.z + y * gpu->bitangent.z;
-        break;
     }
 }

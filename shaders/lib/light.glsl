@@ -32,6 +32,29 @@ float area_spread(gpu_light light, float cosine)
     return max((limit - tangent) / (limit - atan(limit)), 0.0);
 }
 
+// Shirley and Chiu, "A Low Distortion Map Between Disk and Square", JGT 1997.
+vec2 square_to_disk(vec2 p)
+{
+    if (p == vec2(0.0))
+        return p;
+    bool wide = abs(p.x) > abs(p.y);
+    float radius = wide ? p.x : p.y;
+    float angle = wide ? 0.25 * PI * (p.y / p.x) : 0.5 * PI - 0.25 * PI * (p.x / p.y);
+    return radius * vec2(cos(angle), sin(angle));
+}
+
+// The point of the light that a sample stands for; on an area light moved by lot (-1..1) within the
+// sample's stratum.
+vec3 light_point(gpu_light light, gpu_light_sample s, vec2 lot)
+{
+    if (light.info.x < uint(LIGHT_RECTANGLE))
+        return s.position.xyz;
+    vec2 p = s.weight.xy + lot * s.weight.zw;
+    if (light.info.x == uint(LIGHT_ELLIPSE))
+        p = square_to_disk(p);
+    return light.position.xyz + light.tangent.xyz * p.x + light.bitangent.xyz * p.y;
+}
+
 // Radiance times solid angle, per sample of the light, that arrives from `point` (for a sun: a unit
 // vector towards it) at p, without the 1/d^2, which comes out in `square`.
 vec3 light_intensity(gpu_light light, vec3 point, vec3 p, out vec3 towards, out float square)

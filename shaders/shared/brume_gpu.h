@@ -79,7 +79,8 @@ struct gpu_light {
 struct gpu_light_sample {
     vec4 position;   /* point on the light; sun and world: unit vector towards it.
                         w: first shadow layer, -1: none */
-    vec4 weight;     /* world: radiance times solid angle; else 1 / count. w: unused */
+    vec4 weight;     /* world: radiance times solid angle. area: middle and half size of the
+                        stratum in [-1, 1]^2 */
 };
 
 /* One layer of the shadow maps. */

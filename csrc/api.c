@@ -279,7 +279,11 @@ void brume_job_cancel(brume_job *job)
 
 const char *brume_job_error(const brume_job *job)
 {
-    return job ? job->error : "";
+    if (!job)
+        return "";
+    brume_job_status status;
+    job_poll((brume_job *)job, &status); /* written once, before the state changes */
+    return status.state == BRUME_JOB_FAILED ? job->error : "";
 }
 
 brume_result brume_job_warning(const brume_job *job, uint32_t index, const char **id,

@@ -20,6 +20,16 @@ void log_set_sink(brume_log_function function, void *user)
     pthread_mutex_unlock(&sink.mutex);
 }
 
+void log_clear_sink(brume_log_function function, void *user)
+{
+    pthread_mutex_lock(&sink.mutex);
+    if (sink.function == function && sink.user == user) {
+        sink.function = NULL;
+        sink.user = NULL;
+    }
+    pthread_mutex_unlock(&sink.mutex);
+}
+
 void log_write(brume_log_level level, const char *format, ...)
 {
     static const char *const words[] = {"error", "warning", "info", "debug"};

@@ -11,6 +11,8 @@ extern "C" {
 
 /* NULL: errors and warnings to stderr. */
 void log_set_sink(brume_log_function function, void *user);
+/* Back to stderr, if the sink is still this one. */
+void log_clear_sink(brume_log_function function, void *user);
 
 void log_write(brume_log_level level, const char *format, ...)
     __attribute__((format(printf, 2, 3)));

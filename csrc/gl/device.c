@@ -30,13 +30,15 @@ static void *thread_main(void *argument)
         device->first = task->next;
         if (!device->first)
             device->last = NULL;
-        device->busy = 1;
         pthread_mutex_unlock(&device->mutex);
         task->run(&device->gpu, task->user);
-        free(task);
         pthread_mutex_lock(&device->mutex);
-        device->busy = 0;
-        pthread_cond_broadcast(&device->idle);
+        if (task->done) {
+            *task->done = 1;
+            pthread_cond_broadcast(&device->idle);
+        } else {
+            free(task);
+        }
     }
     pthread_mutex_unlock(&device->mutex);
 
@@ -53,13 +55,16 @@ brume_result device_create(const brume_device_params *params, brume_device **out
     brume_device *device = calloc(1, sizeof *device);
     if (!device)
         return fail(BRUME_E_MEMORY, "no memory for the device");
-    log_set_sink(params->log, params->log_user);
+    device->references = 1;
     device->debug = params->debug;
+    device->log = params->log;
+    device->log_user = params->log_user;
     brume_result result = program_cache_init(&device->gpu.programs, params->shader_dir);
     if (result != BRUME_OK) {
         free(device);
         return result;
     }
+    log_set_sink(device->log, device->log_user);
     pthread_mutex_init(&device->mutex, NULL);
     pthread_cond_init(&device->wake, NULL);
     pthread_cond_init(&device->idle, NULL);
@@ -80,6 +85,7 @@ brume_result device_create(const brume_device_params *params, brume_device **out
     return BRUME_OK;
 
 error:
+    log_clear_sink(device->log, device->log_user);
     pthread_cond_destroy(&device->idle);
     pthread_cond_destroy(&device->wake);
     pthread_mutex_destroy(&device->mutex);
@@ -87,8 +93,16 @@ error:
     return result;
 }
 
-void device_destroy(brume_device *device)
+brume_device *device_retain(brume_device *device)
 {
+    __atomic_add_fetch(&device->references, 1, __ATOMIC_RELAXED);
+    return device;
+}
+
+void device_release(brume_device *device)
+{
+    if (__atomic_sub_fetch(&device->references, 1, __ATOMIC_ACQ_REL) != 0)
+        return;
     pthread_mutex_lock(&device->mutex);
     device->quit = 1;
     pthread_cond_broadcast(&device->wake);
@@ -97,8 +111,23 @@ void device_destroy(brume_device *device)
     pthread_cond_destroy(&device->idle);
     pthread_cond_destroy(&device->wake);
     pthread_mutex_destroy(&device->mutex);
-    log_set_sink(NULL, NULL);
     free(device);
+}
+
+void device_destroy(brume_device *device)
+{
+    log_clear_sink(device->log, device->log_user);
+    device_release(device);
+}
+
+static void push(brume_device *device, struct task *task)
+{
+    if (device->last)
+        device->last->next = task;
+    else
+        device->first = task;
+    device->last = task;
+    pthread_cond_broadcast(&device->wake);
 }
 
 brume_result device_post(brume_device *device, void (*run)(struct gpu *, void *), void *user)
@@ -109,20 +138,18 @@ brume_result device_post(brume_device *device, void (*run)(struct gpu *, void *)
     task->run = run;
     task->user = user;
     pthread_mutex_lock(&device->mutex);
-    if (device->last)
-        device->last->next = task;
-    else
-        device->first = task;
-    device->last = task;
-    pthread_cond_broadcast(&device->wake);
+    push(device, task);
     pthread_mutex_unlock(&device->mutex);
     return BRUME_OK;
 }
 
-void device_drain(brume_device *device)
+void device_call(brume_device *device, void (*run)(struct gpu *, void *), void *user)
 {
+    int done = 0;
+    struct task task = {.run = run, .user = user, .done = &done};
     pthread_mutex_lock(&device->mutex);
-    while (device->first || device->busy)
+    push(device, &task);
+    while (!done)
         pthread_cond_wait(&device->idle, &device->mutex);
     pthread_mutex_unlock(&device->mutex);
 }

@@ -19,27 +19,35 @@ struct gpu {
 struct task {
     void (*run)(struct gpu *gpu, void *user);
     void *user;
+    int *done; /* set once it ran, where somebody waits; the waiter owns the task then */
     struct task *next;
 };
 
 struct brume_device {
+    int references; /* atomic access only: the caller's and the scenes' */
     struct gpu gpu;
+    brume_log_function log;
+    void *log_user;
     uint32_t debug;
     pthread_t thread;
     pthread_mutex_t mutex;
     pthread_cond_t wake, idle;
     struct task *first, *last;
-    int busy, quit, ready;
+    int quit, ready;
     brume_result start_result;
     char start_error[1024];
 };
 
 brume_result device_create(const brume_device_params *params, brume_device **out);
+/* Takes the log back from the caller, and ends the thread once no scene is left. */
 void device_destroy(brume_device *device);
+brume_device *device_retain(brume_device *device);
+void device_release(brume_device *device);
 
 /* Queues the task; never waits for it. */
 brume_result device_post(brume_device *device, void (*run)(struct gpu *, void *), void *user);
-/* Returns when every task posted before has run. Not from the device's thread. */
-void device_drain(brume_device *device);
+/* Queues the task and returns when it has run, and with it all that was posted before. Cannot fail.
+ * Not from the device's thread. */
+void device_call(brume_device *device, void (*run)(struct gpu *, void *), void *user);
 
 #endif

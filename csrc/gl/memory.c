@@ -22,6 +22,7 @@ static void discount(struct memory *memory, enum purpose purpose, uint64_t bytes
 brume_result buffer_init(struct memory *memory, struct buffer *buffer, enum purpose purpose,
                          uint64_t bytes, const void *data, const char *label)
 {
+    const uint64_t given = bytes;
     if (bytes < 16)
         bytes = 16; /* a binding point wants something, even for an empty list */
     memset(buffer, 0, sizeof *buffer);
@@ -39,8 +40,8 @@ brume_result buffer_init(struct memory *memory, struct buffer *buffer, enum purp
     buffer->bytes = bytes;
     buffer->purpose = purpose;
     count(memory, purpose, bytes);
-    if (data)
-        glNamedBufferSubData(buffer->id, 0, (GLsizeiptr)bytes, data);
+    if (data && given)
+        glNamedBufferSubData(buffer->id, 0, (GLsizeiptr)given, data);
     return BRUME_OK;
 }
 

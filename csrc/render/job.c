@@ -71,6 +71,7 @@ static void unreference(brume_job *job)
         return;
     for (int pass = 0; pass < BRUME_PASS_COUNT; ++pass)
         free(job->pixels[pass]);
+    snapshot_finish(&job->snapshot);
     pthread_cond_destroy(&job->ended);
     job_control_finish(&job->control);
     free(job);
@@ -109,8 +110,7 @@ static brume_result allocate_pixels(brume_job *job)
 static void run_job(struct gpu *gpu, void *user)
 {
     brume_job *job = user;
-    struct snapshot snapshot = {0};
-    struct render_request request = {.snapshot = &snapshot,
+    struct render_request request = {.snapshot = &job->snapshot,
                                      .settings = job->settings,
                                      .view = job->view,
                                      .control = &job->control};
@@ -123,13 +123,11 @@ static void run_job(struct gpu *gpu, void *user)
         result = fail(BRUME_E_CANCELLED, "cancelled");
     if (result == BRUME_OK)
         result = allocate_pixels(job);
-    if (result == BRUME_OK)
-        result = scene_snapshot(&job->scene->scene, &snapshot);
     if (result == BRUME_OK) {
         memcpy(request.pixels, job->pixels, sizeof request.pixels);
         result = renderer_run(gpu, &job->scene->renderer, &request);
-        snapshot_finish(&snapshot);
     }
+    snapshot_finish(&job->snapshot); /* a picture that is kept keeps no scene alive */
     job->stats = request.stats;
     end(job, result);
     unreference(job);
@@ -147,6 +145,8 @@ brume_result job_create(brume_scene *scene, const brume_settings *settings, cons
     brume_result result = check_settings(&job->settings);
     if (result == BRUME_OK)
         result = check_view(&job->view);
+    if (result == BRUME_OK)
+        result = scene_snapshot(&scene->scene, &job->snapshot);
     if (result != BRUME_OK) {
         free(job);
         return result;
@@ -254,7 +254,7 @@ brume_result scene_open(brume_device *device, brume_scene **out)
     brume_scene *scene = calloc(1, sizeof *scene);
     if (!scene)
         return fail(BRUME_E_MEMORY, "no memory for a scene");
-    scene->device = device;
+    scene->device = device_retain(device);
     scene_init(&scene->scene);
     *out = scene;
     return BRUME_OK;
@@ -269,9 +269,8 @@ static void close_renderer(struct gpu *gpu, void *user)
 void scene_close(brume_scene *scene)
 {
     __atomic_store_n(&scene->closing, 1, __ATOMIC_RELEASE);
-    if (device_post(scene->device, close_renderer, scene) != BRUME_OK)
-        return; /* no memory even for that: leak the scene rather than pull it from under a job */
-    device_drain(scene->device);
+    device_call(scene->device, close_renderer, scene);
+    device_release(scene->device);
     scene_finish(&scene->scene);
     free(scene);
 }

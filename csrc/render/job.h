@@ -16,6 +16,7 @@ struct brume_job {
     int references; /* atomic access only: the caller's and the queue's */
     brume_scene *scene;
     struct job_control control;
+    struct snapshot snapshot; /* of the scene when brume_render was called */
     brume_settings settings;
     brume_view view;
 

@@ -145,6 +145,9 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
     frame->fog_lower = frame->fog_upper = (vec4){0};
     frame->fog_sigma_s = frame->fog_sigma_t = frame->fog_emission = (vec4){0};
     memset(renderer->tau_size, 0, sizeof renderer->tau_size);
+    /* No tile is left from a medium that is gone. */
+    for (uint32_t i = 0; i < renderer->shadows.light_count; ++i)
+        renderer->shadows.lights[i].info.w = 0;
     layout_fog(renderer, request->snapshot);
     /* The sky's lattice needs a cell's size to march by, medium or not. */
     frame->medium_lower = (vec4){0, 0, 0, 1};

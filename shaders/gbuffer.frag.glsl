@@ -36,7 +36,8 @@ void main()
 
     vec3 view_vector = stage.eye.w != 0.0 ? stage.eye.xyz - world_position : -stage.eye.xyz;
     vec3 face = cross(dFdx(world_position), dFdy(world_position));
-    vec3 normal = normalize(world_normal);
+    // Corner normals that cancel one another leave none: a dark pixel, but not NaN.
+    vec3 normal = world_normal * inversesqrt(max(dot(world_normal, world_normal), 1e-30));
     // Both sides of a surface are the same: the normal looks at the viewer.
     if (dot(face, view_vector) < 0.0)
         face = -face;
@@ -56,5 +57,5 @@ void main()
     out_normal = vec4(normal, depth);
     out_diffuse = vec4(material.diffuse.rgb * base.rgb, clamp(roughness, 0.0, 1.0));
     out_specular = vec4(material.specular.rgb + material.metal.rgb * base.rgb, holdout ? 1.0 : 0.0);
-    out_emission = vec4(material.emission.rgb, 0.0);
+    out_emission = vec4(min(material.emission.rgb, vec3(65504.0)), 0.0); // what halves hold
 }

@@ -39,7 +39,9 @@ void main()
         green += light.g * basis;
         blue += light.b * basis;
     }
-    imageStore(sky_image[0], node, red);
-    imageStore(sky_image[1], node, green);
-    imageStore(sky_image[2], node, blue);
+    // Half floats end at 65504, and infinity times nothing is NaN.
+    const vec4 most = vec4(65504.0);
+    imageStore(sky_image[0], node, clamp(red, -most, most));
+    imageStore(sky_image[1], node, clamp(green, -most, most));
+    imageStore(sky_image[2], node, clamp(blue, -most, most));
 }

@@ -8,6 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* m; squares of distances stay finite floats. */
+#define FARTHEST 1e15f
+
 /* --- Caches ------------------------------------------------------------------------------- */
 
 static brume_result upload_mesh(struct gpu *gpu, struct gpu_mesh *mesh, const struct entry *entry)
@@ -46,9 +49,10 @@ static brume_result upload_image(struct gpu *gpu, struct gpu_image *image,
     if (source->width > limit || source->height > limit)
         return fail(BRUME_E_MEMORY, "image '%s' of %d x %d pixels is larger than the driver's %d",
                     source->name, source->width, source->height, limit);
-    TRY(texture_init(&gpu->memory, &image->texture, FOR_IMAGE, GL_TEXTURE_2D, GL_RGBA16F,
-                     source->width, source->height, 1, mip_levels(source->width, source->height),
-                     source->name));
+    /* The sun of an outdoor panorama passes what halves hold. */
+    const GLenum format = source->maximum > 65504.0f ? GL_RGBA32F : GL_RGBA16F;
+    TRY(texture_init(&gpu->memory, &image->texture, FOR_IMAGE, GL_TEXTURE_2D, format, source->width,
+                     source->height, 1, mip_levels(source->width, source->height), source->name));
     const GLuint id = image->texture.id;
     glTextureSubImage2D(id, 0, 0, 0, source->width, source->height, GL_RGBA, GL_FLOAT,
                         source->pixels);
@@ -70,23 +74,24 @@ static brume_result sync_meshes(struct gpu *gpu, struct geometry *geometry,
     if (!fresh)
         return fail(BRUME_E_MEMORY, "no memory for %u meshes", table->count);
     brume_result result = BRUME_OK;
+    /* What goes is freed before anything new comes. */
+    for (uint32_t i = 0; i < geometry->mesh_count; ++i) {
+        struct gpu_mesh *mesh = &geometry->meshes[i];
+        const struct entry *entry = table_find(table, mesh->key);
+        if (!entry || entry->revision != mesh->revision)
+            buffer_finish(&gpu->memory, &mesh->corners);
+    }
     uint32_t old = 0, count = 0;
-    for (uint32_t i = 0; i < table->count && result == BRUME_OK; ++i) {
+    for (uint32_t i = 0; i < table->count; ++i) {
         const struct entry *entry = &table->entries[i];
         while (old < geometry->mesh_count && geometry->meshes[old].key < entry->key)
-            buffer_finish(&gpu->memory, &geometry->meshes[old++].corners);
-        if (old < geometry->mesh_count && geometry->meshes[old].key == entry->key) {
-            struct gpu_mesh *kept = &geometry->meshes[old++];
-            if (kept->revision == entry->revision) {
-                fresh[count++] = *kept;
-                continue;
-            }
-            buffer_finish(&gpu->memory, &kept->corners);
-        }
-        result = upload_mesh(gpu, &fresh[count++], entry);
+            ++old;
+        if (old < geometry->mesh_count && geometry->meshes[old].key == entry->key &&
+            geometry->meshes[old].corners.id)
+            fresh[count++] = geometry->meshes[old++];
+        else if (result == BRUME_OK && (result = upload_mesh(gpu, &fresh[count], entry)) == BRUME_OK)
+            ++count;
     }
-    while (old < geometry->mesh_count)
-        buffer_finish(&gpu->memory, &geometry->meshes[old++].corners);
     free(geometry->meshes);
     geometry->meshes = fresh;
     geometry->mesh_count = count;
@@ -99,26 +104,25 @@ static brume_result sync_images(struct gpu *gpu, struct geometry *geometry,
     struct gpu_image *fresh = calloc((size_t)table->count + 1, sizeof *fresh);
     if (!fresh)
         return fail(BRUME_E_MEMORY, "no memory for %u images", table->count);
+    for (uint32_t i = 0; i < geometry->image_count; ++i) {
+        struct gpu_image *image = &geometry->images[i];
+        const struct entry *entry = table_find(table, image->key);
+        if (!entry || entry->revision != image->revision)
+            texture_finish(&gpu->memory, &image->texture);
+    }
     uint32_t old = 0, count = 0;
     for (uint32_t i = 0; i < table->count; ++i) {
         const struct entry *entry = &table->entries[i];
         while (old < geometry->image_count && geometry->images[old].key < entry->key)
-            texture_finish(&gpu->memory, &geometry->images[old++].texture);
-        if (old < geometry->image_count && geometry->images[old].key == entry->key) {
-            struct gpu_image *kept = &geometry->images[old++];
-            if (kept->revision == entry->revision) {
-                fresh[count++] = *kept;
-                continue;
-            }
-            texture_finish(&gpu->memory, &kept->texture);
-        }
-        if (upload_image(gpu, &fresh[count], entry) == BRUME_OK)
+            ++old;
+        if (old < geometry->image_count && geometry->images[old].key == entry->key &&
+            geometry->images[old].texture.id)
+            fresh[count++] = geometry->images[old++];
+        else if (upload_image(gpu, &fresh[count], entry) == BRUME_OK)
             ++count;
         else
             job_warn(control, "IMAGE_LEFT_OUT", "%s", last_error());
     }
-    while (old < geometry->image_count)
-        texture_finish(&gpu->memory, &geometry->images[old++].texture);
     free(geometry->images);
     geometry->images = fresh;
     geometry->image_count = count;
@@ -236,7 +240,8 @@ static void write_instance(struct gpu_instance *out, const float *world_from_obj
 
 static void add_draws(struct geometry *geometry, const struct snapshot *snapshot,
                       const struct mesh_block *mesh, const struct gpu_mesh *gpu_mesh,
-                      const struct instances_block *set, uint32_t first_instance)
+                      const struct instances_block *set, uint32_t first_instance,
+                      uint32_t instance_count)
 {
     const struct table *materials = &snapshot->tables[BRUME_KIND_MATERIAL];
     for (uint32_t slot = 0; slot < mesh->slot_count; ++slot) {
@@ -248,7 +253,7 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
                               .first_corner = 3 * first,
                               .corner_count = 3 * (end - first),
                               .first_instance = first_instance,
-                              .instance_count = set->count,
+                              .instance_count = instance_count,
                               .visibility = set->visibility};
         const struct entry *entry = table_find(materials, mesh->materials[slot]);
         if (!entry)
@@ -263,8 +268,22 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
     }
 }
 
+/* False where finite vertices and a finite matrix make a place that no number holds. */
+static int add_bounds(struct geometry *geometry, const struct mesh_block *mesh, const float *matrix)
+{
+    float lower[3], upper[3];
+    mat4_bounds(matrix, mesh->lower, mesh->upper, lower, upper);
+    for (int i = 0; i < 3; ++i)
+        if (!(fabsf(lower[i]) < FARTHEST && fabsf(upper[i]) < FARTHEST))
+            return 0;
+    grow(geometry->lower, geometry->upper, lower, upper);
+    if (!is_flat(mesh))
+        grow(geometry->solid_lower, geometry->solid_upper, lower, upper);
+    return 1;
+}
+
 static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
-                                   const struct snapshot *snapshot)
+                                   const struct snapshot *snapshot, struct job_control *control)
 {
     const struct table *table = &snapshot->tables[BRUME_KIND_INSTANCES];
     const struct table *meshes = &snapshot->tables[BRUME_KIND_MESH];
@@ -299,19 +318,23 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
         const struct mesh_block *mesh = (struct mesh_block *)entry->block;
         if (mesh->triangle_count == 0)
             continue;
-        add_draws(geometry, snapshot, mesh, gpu_mesh, set, next);
+        const uint32_t first = next;
         for (uint32_t k = 0; k < set->count; ++k) {
             const float *matrix = set->world_from_object + 16 * (size_t)k;
-            float lower[3], upper[3];
-            mat4_bounds(matrix, mesh->lower, mesh->upper, lower, upper);
-            grow(geometry->lower, geometry->upper, lower, upper);
-            if (!is_flat(mesh))
-                grow(geometry->solid_lower, geometry->solid_upper, lower, upper);
+            if (!add_bounds(geometry, mesh, matrix))
+                continue;
             write_instance(&instances[next], matrix, set->visibility);
             numbers[next] = next;
             ++next;
         }
-        geometry->triangle_count += mesh->triangle_count * set->count;
+        if (next - first < set->count)
+            job_warn(control, "INSTANCES_LEFT_OUT",
+                     "%u of %u instances of mesh '%s' lie farther away than numbers reach",
+                     set->count - (next - first), set->count, mesh->name);
+        if (next == first)
+            continue;
+        add_draws(geometry, snapshot, mesh, gpu_mesh, set, first, next - first);
+        geometry->triangle_count += mesh->triangle_count * (next - first);
     }
     if (result == BRUME_OK)
         result = buffer_update(&gpu->memory, &geometry->instances, FOR_MESH,
@@ -352,7 +375,7 @@ brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,
     TRY(sync_meshes(gpu, geometry, &snapshot->tables[BRUME_KIND_MESH]));
     TRY(sync_images(gpu, geometry, &snapshot->tables[BRUME_KIND_IMAGE], control));
     TRY(sync_materials(gpu, geometry, &snapshot->tables[BRUME_KIND_MATERIAL]));
-    return sync_instances(gpu, geometry, snapshot);
+    return sync_instances(gpu, geometry, snapshot, control);
 }
 
 brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const struct gpu_draw *stage,

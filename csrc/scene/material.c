@@ -78,8 +78,10 @@ brume_result image_create(const brume_image *source, struct block **out)
     image->nearest = source->nearest;
     image->pixels = pixels;
     /* One bad pixel of an HDR must not make the whole picture NaN. */
-    for (size_t i = 0; i < count; ++i)
+    for (size_t i = 0; i < count; ++i) {
         pixels[i] = isfinite(source->pixels[i]) ? source->pixels[i] : 0.0f;
+        image->maximum = fmaxf(image->maximum, fabsf(pixels[i]));
+    }
     *out = &image->block;
     return BRUME_OK;
 }

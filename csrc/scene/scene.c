@@ -61,6 +61,9 @@ static int all_finite(const float *values, int count)
 brume_result scene_set_world(struct scene *scene, const brume_world *world)
 {
     REQUIRE(all_finite(world->color, 3));
+    float inverse[16];
+    if (world->image_from_world[15] != 0.0f && !mat4_invert(world->image_from_world, inverse))
+        return fail(BRUME_E_TRANSFORM, "the world's image has a singular or non-finite rotation");
     REQUIRE(mat4_is_finite(world->image_from_world));
     REQUIRE(all_finite(world->sigma_s, 3) && all_finite(world->sigma_a, 3));
     REQUIRE(all_finite(world->emission, 3));

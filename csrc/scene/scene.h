@@ -38,6 +38,7 @@ struct image_block {
     int32_t width, height;
     uint32_t extend, nearest;
     float *pixels; /* RGBA, finite */
+    float maximum; /* over all of them */
 };
 
 struct light_block {

@@ -122,6 +122,10 @@ brume_result world_samples(const brume_world *world, const struct image_block *i
                                     (float)(sin(polar) * sin(azimuth)), (float)-cos(polar)};
         float turned[3];
         mat4_vector(world_from_image, direction, turned);
+        const float length =
+            sqrtf(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2]);
+        for (int axis = 0; axis < 3; ++axis)
+            turned[axis] /= length;
         const double weight = solid / (density * count);
         const float *rgb = table + 3 * (y * TABLE_WIDTH + x);
         out[i].position = (vec4){turned[0], turned[1], turned[2], -1.0f};

@@ -21,7 +21,8 @@ vec3 bsdf_specular(surface s, vec3 light)
     // Below this a highlight of a point light falls between the pixels.
     float alpha = max(s.roughness * s.roughness, 2e-3);
     float alpha2 = alpha * alpha;
-    vec3 h = normalize(light + s.view);
+    vec3 h = light + s.view;
+    h *= inversesqrt(max(dot(h, h), 1e-12)); // a light exactly opposite the viewer has none
     float nh = clamp(dot(s.normal, h), 0.0, 1.0);
     float d = nh * nh * (alpha2 - 1.0) + 1.0;
     float distribution = alpha2 / (3.14159265358979 * d * d);

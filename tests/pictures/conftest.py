@@ -1,7 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The --refresh option: render the Cycles references again."""
+"""The options of the comparison: --refresh renders the Cycles references again, --write-table puts
+the differences of a run into the page of the method."""
+import os
+
+PAGE = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'docs', 'methods', 'opv.md')
+BEGIN, END = '<!-- pictures -->', '<!-- /pictures -->'
+
+differences = []    # (case, difference, tolerance), as the tests find them
 
 
 def pytest_addoption(parser):
     parser.addoption('--refresh', action='store_true',
                      help='render the Cycles references of the selected cases again')
+    parser.addoption('--write-table', action='store_true',
+                     help='write the differences into docs/methods/opv.md')
+
+
+def table():
+    yield '| case | difference | limit |'
+    yield '| --- | ---: | ---: |'
+    for name, difference, tolerance in differences:
+        yield f'| {name} | {100 * difference:.2f} % | {100 * tolerance:.0f} % |'
+
+
+def pytest_sessionfinish(session):
+    if not session.config.getoption('--write-table') or not differences:
+        return
+    with open(PAGE, encoding='utf-8') as file:
+        before, rest = file.read().split(BEGIN)
+    after = rest.split(END)[1]
+    with open(PAGE, 'w', encoding='utf-8') as file:
+        file.write('\n'.join([before + BEGIN, '', *table(), '', END + after]))

@@ -11,11 +11,24 @@
 #include <string.h>
 
 #define PI 3.14159265358979323846f
+#define SPREAD_MIN 0.0174532925f /* Blender's; below it tan(x) - x has no digits left */
 #define GOLDEN_ANGLE 2.39996322972865332f
 
 static void light_destroy(struct block *block)
 {
     free(block);
+}
+
+static int is_finite(const struct gpu_light *gpu)
+{
+    const vec4 *const vectors[] = {&gpu->position,  &gpu->axis,     &gpu->tangent,
+                                   &gpu->bitangent, &gpu->radiance, &gpu->factors};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; ++i) {
+        const vec4 v = *vectors[i];
+        if (!isfinite(v.x) || !isfinite(v.y) || !isfinite(v.z) || !isfinite(v.w))
+            return 0;
+    }
+    return 1;
 }
 
 brume_result light_create(const brume_light *source, struct block **out)
@@ -45,6 +58,14 @@ brume_result light_create(const brume_light *source, struct block **out)
     owner->light.angle = fminf(fmaxf(source->angle, 0.0f), 3.1f);
     owner->light.spot_angle = fminf(fmaxf(source->spot_angle, 1e-3f), PI);
     owner->light.spot_blend = fminf(fmaxf(source->spot_blend, 0.0f), 1.0f);
+    if (source->spread > 0.0f)
+        owner->light.spread = fmaxf(source->spread, SPREAD_MIN);
+    struct gpu_light gpu;
+    light_to_gpu(&owner->light, &gpu);
+    if (!is_finite(&gpu)) {
+        light_destroy(&owner->block);
+        return fail(BRUME_E_ARGUMENT, "light '%s' is larger or brighter than numbers reach", name);
+    }
     *out = &owner->block;
     return BRUME_OK;
 }

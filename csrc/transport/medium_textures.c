@@ -53,6 +53,27 @@ static float *make_bricks(const struct medium_lattice *lattice, const int bricks
     return occupied;
 }
 
+/* Infinite in a half float, and infinity times nothing is NaN. A cell this dense is opaque whatever
+ * its number: both coefficients shrink alike, so that the albedo stays. */
+#define HALF_MAX 65504.0f
+
+static void fit_halves(struct medium_lattice *lattice)
+{
+    const size_t cells =
+        (size_t)lattice->dims[0] * (size_t)lattice->dims[1] * (size_t)lattice->dims[2];
+    for (size_t cell = 0; cell < cells; ++cell) {
+        float *scatter = lattice->scatter + 4 * cell, *extinct = lattice->extinct + 4 * cell;
+        for (int c = 0; c < 3; ++c) {
+            if (extinct[c] > HALF_MAX) {
+                scatter[c] = scatter[c] / extinct[c] * HALF_MAX;
+                extinct[c] = HALF_MAX;
+            }
+            if (lattice->emission && lattice->emission[4 * cell + (size_t)c] > HALF_MAX)
+                lattice->emission[4 * cell + (size_t)c] = HALF_MAX;
+        }
+    }
+}
+
 static brume_result fill(struct gpu *gpu, struct texture *texture, GLenum format,
                          const int32_t dims[3], GLenum channels, const float *data,
                          const char *label)
@@ -65,8 +86,9 @@ static brume_result fill(struct gpu *gpu, struct texture *texture, GLenum format
 }
 
 brume_result medium_textures_upload(struct gpu *gpu, struct medium_textures *textures,
-                                    const struct medium_lattice *lattice)
+                                    struct medium_lattice *lattice)
 {
+    fit_halves(lattice);
     memcpy(textures->dims, lattice->dims, sizeof textures->dims);
     memcpy(textures->lower, lattice->lower, sizeof textures->lower);
     memcpy(textures->upper, lattice->upper, sizeof textures->upper);

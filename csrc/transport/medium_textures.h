@@ -17,8 +17,9 @@ struct medium_textures {
  * and its part of a brick. */
 #define MEDIUM_CELL_BYTES 25
 
+/* Brings the lattice's values within what half floats hold, and uploads them. */
 brume_result medium_textures_upload(struct gpu *gpu, struct medium_textures *textures,
-                                    const struct medium_lattice *lattice);
+                                    struct medium_lattice *lattice);
 void medium_textures_bind(const struct medium_textures *textures);
 void medium_textures_finish(struct gpu *gpu, struct medium_textures *textures);
 

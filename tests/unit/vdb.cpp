@@ -4,8 +4,12 @@
 #include "base/result.h"
 #include "io/vdb.h"
 
+/* The project hides its symbols. OpenVDB's templates here must be one with those in its library:
+ * of Tree::treeType, one half hidden and one not crashes openvdb::initialize. */
+#pragma GCC visibility push(default)
 #include <openvdb/io/io.h>
 #include <openvdb/openvdb.h>
+#pragma GCC visibility pop
 
 #include <chrono>
 #include <climits>

@@ -24,7 +24,6 @@ from datetime import datetime, timezone
 
 import bpy
 from brume import native, session
-from brume.engine import BrumeEngine
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 ENGINES = ('BRUME', 'BLENDER_EEVEE', 'CYCLES')
@@ -36,19 +35,14 @@ MEMORY = ('medium_bytes', 'transport_bytes', 'shadow_bytes', 'mesh_bytes', 'imag
 details = []  # of each Brume frame
 
 
-def watch_brume():
-    """Has the engine hand over the figures that it otherwise only shows."""
-    finish = BrumeEngine._finish
-
-    def record(self, depsgraph, stats, export_s, whole_s):
-        details.append({
-            'export_ms': export_s * 1e3,
-            'stages_ms': {name: stats.stages[i].wall_ms for i, name in enumerate(native.STAGES)},
-            'memory': {name: getattr(stats, name) for name in MEMORY},
-            'medium_dims': list(stats.medium_dims), 'transport_dims': list(stats.transport_dims)})
-        finish(self, depsgraph, stats, export_s, whole_s)
-
-    BrumeEngine._finish = record
+def note_details():
+    """Keeps the figures of the Brume frame that was rendered last."""
+    stats, export_s, _ = session.last_stats
+    details.append({
+        'export_ms': export_s * 1e3,
+        'stages_ms': {name: stats.stages[i].wall_ms for i, name in enumerate(native.STAGES)},
+        'memory': {name: getattr(stats, name) for name in MEMORY},
+        'medium_dims': list(stats.medium_dims), 'transport_dims': list(stats.transport_dims)})
 
 
 def open_scene(name, engine):
@@ -72,7 +66,10 @@ def frame(name, engine):
         session.drop('final')
     wall, cpu = time.perf_counter(), time.process_time()
     bpy.ops.render.render()
-    return time.perf_counter() - wall, time.process_time() - cpu
+    spent = time.perf_counter() - wall, time.process_time() - cpu
+    if engine == 'BRUME':
+        note_details()
+    return spent
 
 
 def samples_of(engine):
@@ -138,7 +135,6 @@ def main(arguments):
     parser.add_argument('--out', default=os.path.join(ROOT, 'out', 'bench', 'peers.jsonl'))
     options = parser.parse_args(arguments)
 
-    watch_brume()
     where = place()
     times = {engine: [] for engine in options.engines}
     samples = {}

@@ -15,6 +15,10 @@ POLL_MS = 30
 STATUS_INTERVAL = 0.2
 
 
+def _told(id, sentence):
+    return f"{sentence.rstrip('.')} ({id})"
+
+
 class BrumeEngine(bpy.types.RenderEngine):
     """Owns nothing native: Blender makes one per frame and throws it away."""
 
@@ -36,7 +40,7 @@ class BrumeEngine(bpy.types.RenderEngine):
         try:
             self._render(depsgraph, result)
         except native.BrumeError as error:
-            self._fail(f"{error.sentence} ({error.id})")
+            self._fail(_told(error.id, error.sentence))
         except Exception as error:
             traceback.print_exc()
             self._fail(f"Brume: {type(error).__name__}: {error}")
@@ -54,18 +58,20 @@ class BrumeEngine(bpy.types.RenderEngine):
             self.update_stats("", "Brume | Exporting")
             scene.export(depsgraph, stage.target)
             view, passes = self._view(depsgraph, result, stage.target)
-            self._warn(stage.target.reports)
+            warnings = list(stage.target.reports)
             exported = time.perf_counter()
             settings = native_settings(depsgraph.scene_eval.brume)
             job = stage.scene.render(settings, view)
             try:
-                if not self._wait(job, view.samples):
-                    return
-                self._warn(job.warnings())
-                self._write(result, job, passes)
-                self._finish(depsgraph, job.stats(), exported - began,
-                             time.perf_counter() - began)
+                if self._wait(job, view.samples):
+                    self._write(result, job, passes)
+                    if not self.is_preview:
+                        now = time.perf_counter()
+                        self._finish(depsgraph, session.RenderStats(
+                            job.stats(), exported - began, now - began))
             finally:
+                # After the statistics, since Blender's status bar shows the last report.
+                self._warn(warnings + job.warnings())
                 job.close()
 
     def _view(self, depsgraph, result, target):
@@ -126,24 +132,24 @@ class BrumeEngine(bpy.types.RenderEngine):
         scene of a preview is Blender's own, and no concern of the user's."""
         if self.is_preview:
             return
-        for _, sentence in entries:
-            self.report({'WARNING'}, sentence)
+        for entry in entries:
+            self.report({'WARNING'}, _told(*entry))
             if bpy.app.background:
-                print(f"Brume: warning: {sentence}", flush=True)
+                print(f"Brume: warning: {_told(*entry)}", flush=True)
 
-    def _finish(self, depsgraph, stats, export_s, whole_s):
-        """The status line, and in background a printed one."""
-        if self.is_preview:
-            return
-        times = [f"{native.library().stage_name(index).decode()} {stats.stages[index].wall_ms:.0f}"
-                 for index in range(len(native.STAGES))]
-        line = (f"Brume | {whole_s:.2f} s | export {export_s * 1000:.0f}, {', '.join(times)} ms | "
-                f"peak {stats.peak_bytes / 2 ** 20:.0f} MiB")
-        self.update_stats("", line)
+    def _finish(self, depsgraph, last):
+        """Tells what the frame took: session.RenderStats."""
+        session.last_stats = last
+        stats = last.stats
+        line = (f"Brume | {last.whole_s:.2f} s | export {last.export_s * 1000:.0f}, "
+                f"{session.stage_times(stats)} | peak {stats.peak_bytes / 2 ** 20:.0f} MiB | "
+                f"frame {depsgraph.scene_eval.frame_current}")
         self.update_memory_stats(memory_used=stats.total_bytes / 2 ** 20,
                                  memory_peak=stats.peak_bytes / 2 ** 20)
         if bpy.app.background:
-            print(f"{line} | frame {depsgraph.scene_eval.frame_current}", flush=True)
+            print(line, flush=True)
+        else:  # Blender clears the status of a render that ended, and shows the last report
+            self.report({'INFO'}, line)
 
     def update_render_passes(self, scene=None, renderlayer=None):
         for _, name, channels, kind in passes_of(renderlayer):

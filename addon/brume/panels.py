@@ -30,32 +30,67 @@ class _Rows:
             layout.prop(context.scene.brume, name)
 
 
-class BRUME_PT_sampling(_Rows, _RenderPanel, bpy.types.Panel):
+class BRUME_PT_sampling(_RenderPanel, bpy.types.Panel):
     bl_label = "Sampling"
-    rows = ("method", "preset", "samples", "seed")
 
     def draw(self, context):
+        layout, settings = self.layout, context.scene.brume
+        layout.use_property_split = True
+        layout.use_property_decorate = False
         try:
             native.library()
         except native.BrumeError as error:
-            self.layout.label(text=error.sentence, icon='ERROR')
-        super().draw(context)
+            layout.label(text=error.sentence, icon='ERROR')
+        layout.prop(settings, "preset")
+        column = layout.column(align=True)
+        column.prop(settings, "viewport_samples", text="Samples Viewport")
+        column.prop(settings, "samples", text="Render")
 
 
-class BRUME_PT_media(_Rows, _RenderPanel, bpy.types.Panel):
-    bl_label = "Media"
-    rows = ("medium_resolution", "lattice_resolution", "iterations", "step", "world_reach")
+class BRUME_PT_sampling_advanced(_Rows, _RenderPanel, bpy.types.Panel):
+    bl_label = "Advanced"
+    bl_parent_id = "BRUME_PT_sampling"
+    bl_options = {'DEFAULT_CLOSED'}
+    rows = ("seed",)
+
+
+class BRUME_PT_volumes(_Rows, _RenderPanel, bpy.types.Panel):
+    bl_label = "Volumes"
+    # Iterations come here with the first method that has any.
+    rows = ("method", "medium_resolution", "lattice_resolution", "step")
+
+
+class BRUME_PT_world_volume(_RenderPanel, bpy.types.Panel):
+    bl_label = "World Volume"
+    bl_parent_id = "BRUME_PT_volumes"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        layout, settings = self.layout, context.scene.brume
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(settings, "world_unlimited")
+        row = layout.row()
+        row.active = not settings.world_unlimited
+        row.prop(settings, "world_reach", text="Reach")
 
 
 class BRUME_PT_lights(_Rows, _RenderPanel, bpy.types.Panel):
-    bl_label = "Lights"
-    rows = ("light_samples", "world_samples", "shadow_resolution")
+    bl_label = "Lights and Shadows"
+    bl_options = {'DEFAULT_CLOSED'}
+    rows = ("light_samples", "shadow_resolution", "world_samples")
 
 
 class BRUME_PT_performance(_Rows, _RenderPanel, bpy.types.Panel):
     bl_label = "Performance"
     bl_options = {'DEFAULT_CLOSED'}
-    rows = ("memory_budget", "show_statistics")
+    rows = ("memory_budget",)
+
+    def draw(self, context):
+        super().draw(context)
+        self.layout.prop(context.scene.render, "preview_pixel_size", text="Viewport Pixel Size")
+        self.layout.prop(context.scene.render, "use_persistent_data", text="Persistent Data")
+        self.layout.prop(context.scene.brume, "show_statistics")
 
 
 class BRUME_PT_film(_RenderPanel, bpy.types.Panel):
@@ -66,8 +101,8 @@ class BRUME_PT_film(_RenderPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.prop(context.scene.render, "filter_size")
         layout.prop(context.scene.render, "film_transparent")
+        layout.prop(context.scene.render, "filter_size")
 
 
 class BRUME_PT_passes(_RenderPanel, bpy.types.Panel):
@@ -84,8 +119,9 @@ class BRUME_PT_passes(_RenderPanel, bpy.types.Panel):
             column.prop(getattr(context.view_layer, owner) if owner else context.view_layer, name)
 
 
-_CLASSES = (BRUME_PT_sampling, BRUME_PT_media, BRUME_PT_lights, BRUME_PT_film,
-            BRUME_PT_performance, BRUME_PT_passes)
+_CLASSES = (BRUME_PT_sampling, BRUME_PT_sampling_advanced, BRUME_PT_volumes,
+            BRUME_PT_world_volume, BRUME_PT_lights, BRUME_PT_film, BRUME_PT_performance,
+            BRUME_PT_passes)
 
 # EEVEE's panels that show what Brume reads too.
 _ADDED = {

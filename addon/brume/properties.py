@@ -8,15 +8,15 @@ from . import native
 
 METHODS = [
     ('OPV', "Single Scattering",
-     "Light that the medium scatters once: fast, and too dark in thick clouds", 0),
+     "Light that volumes scatter once: fast, and too dark in thick clouds", 0),
 ]
 
 PRESETS = {
-    'DRAFT': {"samples": 4, "medium_resolution": 64, "lattice_resolution": 32,
+    'DRAFT': {"samples": 4, "medium_resolution": 64, "lattice_resolution": 32, "step": 4.0,
               "shadow_resolution": 256, "light_samples": 4, "world_samples": 16},
-    'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64,
+    'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64, "step": 3.0,
                 "shadow_resolution": 512, "light_samples": 8, "world_samples": 32},
-    'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96,
+    'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96, "step": 1.0,
               "shadow_resolution": 1024, "light_samples": 16, "world_samples": 64},
 }
 _DEFAULT = PRESETS['PREVIEW']
@@ -30,72 +30,87 @@ def _apply_preset(settings, context):
 class BrumeSettings(bpy.types.PropertyGroup):
     method: EnumProperty(
         name="Method", items=METHODS, default='OPV',
-        description="How light travels through media")
+        description="How light travels through volumes")
     preset: EnumProperty(
         name="Preset", default='PREVIEW', update=_apply_preset,
-        description="Sets the values below at once",
+        description="Sets samples, resolutions and step below at once. What is changed afterwards "
+                    "stays changed until a preset is chosen again",
         items=[('DRAFT', "Draft", "Coarse and quick, for placing lights", 0),
                ('PREVIEW', "Preview", "For looking at a scene while working on it", 1),
-               ('FINAL', "Final", "Fine, for pictures that are kept", 2)])
+               ('FINAL', "Final", "Fine, for pictures that are kept; takes many times longer "
+                                  "than Preview", 2)])
     samples: IntProperty(
-        name="Samples", default=_DEFAULT["samples"], min=1, max=65536, soft_max=256,
+        name="Render Samples", default=_DEFAULT["samples"], min=1, max=65536, soft_max=256,
         description="Samples a pixel of a final render. Time grows in proportion; noise at edges "
-                    "and in the fog falls with the square root")
+                    "and in volumes falls with the square root")
+    viewport_samples: IntProperty(
+        name="Viewport Samples", default=16, min=1, max=65536, soft_max=256,
+        description="Samples a pixel that the rendered viewport goes on to while nothing "
+                    "changes. The first picture after a change always has one")
     medium_resolution: IntProperty(
-        name="Medium", default=_DEFAULT["medium_resolution"], min=8, max=1024, soft_max=256,
-        description="Cells along the longest side of the lattice that holds the media. More show "
-                    "finer smoke; memory and time grow with the third power")
+        name="Volume Resolution", default=_DEFAULT["medium_resolution"], min=8, max=1024,
+        soft_max=256,
+        description="Cells along the longest side of the lattice that holds all volumes, which "
+                    "is never finer than their own voxels. More show finer smoke; memory and the "
+                    "time to fill it grow with the third power")
     lattice_resolution: IntProperty(
-        name="Lattice", default=_DEFAULT["lattice_resolution"], min=4, max=512, soft_max=128,
+        name="Light Resolution", default=_DEFAULT["lattice_resolution"], min=4, max=512,
+        soft_max=128,
         description="Cells along the longest side of the lattice in which light travels. More "
-                    "give sharper shadows in the medium; memory and time grow with the third "
+                    "give sharper shadows of smoke on smoke; memory and time grow with the third "
                     "power, and with the number of lights")
     iterations: IntProperty(
         name="Iterations", default=0, min=0, max=1024,
         description="Steps of the methods that spread light cell by cell; 0 goes on until it "
                     "converged. Single scattering has none")
     shadow_resolution: IntProperty(
-        name="Shadow Map", default=_DEFAULT["shadow_resolution"], min=16, max=8192, soft_max=4096,
-        description="Texels along the side of a lamp's shadow map. More give sharper shadows of "
-                    "meshes; memory grows with the square, and with lights and light samples")
+        name="Shadow Resolution", default=_DEFAULT["shadow_resolution"], min=16, max=8192,
+        soft_max=4096, subtype='PIXEL',
+        description="Side of a shadow map. More give sharper shadows of meshes; memory and the "
+                    "time to draw them grow with the square, and with lights and light samples")
     light_samples: IntProperty(
         name="Light Samples", default=_DEFAULT["light_samples"], min=1, max=256, soft_max=32,
-        description="Shadow maps spread over each lamp. More give smoother soft shadows; time and "
-                    "memory grow in proportion")
+        description="Shadow maps spread over each light. More give smoother soft shadows; time "
+                    "and memory grow in proportion")
     world_samples: IntProperty(
-        name="World Samples", default=_DEFAULT["world_samples"], min=1, max=4096, soft_max=128,
+        name="World Samples", default=_DEFAULT["world_samples"], min=1, max=1024, soft_max=128,
         description="Directions that stand for the world's light. More catch smaller bright "
-                    "spots of an environment texture; time grows in proportion")
+                    "spots of an environment texture; time and memory grow in proportion")
     step: FloatProperty(
-        name="Step", default=1.0, min=0.05, max=16.0, soft_max=4.0,
-        description="Length of a step through the medium, in its cells. Smaller steps miss less; "
-                    "time grows in inverse proportion")
+        name="Step", default=_DEFAULT["step"], min=0.05, max=16.0, soft_max=4.0, precision=2,
+        description="Length of a step through volumes, in cells of their lattice. Each sample "
+                    "begins its steps elsewhere, so that long ones still add up to the whole: "
+                    "they cost grain, not detail. Time grows in inverse proportion")
     memory_budget: IntProperty(
-        name="Memory Budget", default=2048, min=64, max=1048576, soft_max=32768, subtype='NONE',
-        description="Megabytes that may be used on the GPU. Lattices that would not fit are made "
+        name="Memory Budget (MiB)", default=2048, min=64, max=1048576, soft_max=32768,
+        description="Mebibytes that may be used on the GPU. Lattices that would not fit are made "
                     "coarser, with a warning")
+    world_unlimited: BoolProperty(
+        name="Unlimited", default=False,
+        description="Lets the world's volume go on for ever, as in Cycles. Suns and the sky "
+                    "are then swallowed on their way: only lamps that stand in the scene light it")
     world_reach: FloatProperty(
-        name="World Reach", default=0.0, min=0.0, soft_max=1000.0, unit='LENGTH',
-        description="How far around the scene's objects the world's medium goes. Beyond it light "
-                    "travels freely, so that sun and sky reach the fog. 0 takes half of the "
-                    "scene's diagonal")
+        name="World Volume Reach", default=0.0, min=0.0, soft_max=1000.0, subtype='DISTANCE',
+        description="How far around the scene's objects the world's volume goes; beyond, light "
+                    "travels freely, so that sun and sky reach it. Its cells grow with it. "
+                    "0: half of the scene's diagonal")
     seed: IntProperty(
         name="Seed", default=0, min=0,
         description="Another number gives other noise of the same amount; one number gives the "
                     "same picture every time")
     show_statistics: BoolProperty(
-        name="Show Statistics", default=False,
-        description="Shows the time of each stage in the viewport's corner and prints it after "
-                    "a final render")
+        name="Viewport Statistics", default=False,
+        description="Shows samples and the time of each stage in the rendered viewport's corner. "
+                    "Final renders always tell their times, in the status bar and the info log")
 
 
 class BrumeViewLayerSettings(bpy.types.PropertyGroup):
     use_pass_volume_direct: BoolProperty(
         name="Volume Direct", default=False,
-        description="Light that media scattered straight from lamps and world to the camera")
+        description="Light that volumes scattered straight from lights and world to the camera")
     use_pass_transmittance: BoolProperty(
         name="Transmittance", default=False,
-        description="What the media in front of the first surface let through")
+        description="Share of light that the volumes in front of the first surface let through, by colour")
 
 
 # Pass of brume.h, Blender's name and channels, type for register_pass, and where its switch is.
@@ -117,6 +132,11 @@ def passes_of(view_layer):
              for identifier, name, channels, kind, switch in PASSES
              if view_layer.path_resolve(switch)]
     return used
+
+
+def world_reach(settings):
+    """reach of brume_world."""
+    return -1.0 if settings.world_unlimited else settings.world_reach
 
 
 def native_settings(settings):

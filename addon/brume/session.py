@@ -7,6 +7,7 @@ native hangs on them. The device is made when it is first needed and let go at e
 
 import atexit
 import threading
+from typing import NamedTuple
 
 from . import native
 from .export.target import Target
@@ -14,6 +15,17 @@ from .export.target import Target
 _lock = threading.Lock()
 _device = None
 _stages = {}
+_closing = []  # threads that free what was dropped
+
+
+class RenderStats(NamedTuple):
+    """What a final render took."""
+    stats: native.Stats
+    export_s: float
+    whole_s: float
+
+
+last_stats = None  # RenderStats of the newest final render
 
 
 class Stage:
@@ -25,7 +37,8 @@ class Stage:
         self.target = Target(self.scene)
 
     def close(self):
-        self.scene.close()
+        with self.lock:
+            self.scene.close()
 
 
 def device():
@@ -46,13 +59,19 @@ def stage(name):
         return _stages[name]
 
 
-def drop(name):
-    """Frees a scene that is no longer needed."""
+def drop(name, wait=True):
+    """Frees a scene that is no longer needed. The library first lets all jobs end that were begun
+    before, a long render's too: wait=False leaves that to a thread."""
     with _lock:
         dropped = _stages.pop(name, None)
-    if dropped is not None:
-        with dropped.lock:
-            dropped.close()
+        if dropped is None:
+            return
+        if not wait:
+            thread = threading.Thread(target=dropped.close, name="brume drop")
+            _closing[:] = [other for other in _closing if other.is_alive()] + [thread]
+            thread.start()
+            return
+    dropped.close()
 
 
 def close():
@@ -60,10 +79,20 @@ def close():
     global _device
     for name in list(_stages):
         drop(name)
+    for thread in _closing:
+        thread.join()
+    _closing.clear()
     with _lock:
         if _device is not None:
             _device.close()
             _device = None
+
+
+def stage_times(stats):
+    """The stages' times of native.Stats in words: "upload 1, medium 20, … ms"."""
+    times = (f"{native.library().stage_name(index).decode()} {stats.stages[index].wall_ms:.0f}"
+             for index in range(len(native.STAGES)))
+    return f"{', '.join(times)} ms"
 
 
 atexit.register(close)

@@ -79,19 +79,26 @@ def test_same_pixels_every_time(scene, render):
     assert np.array_equal(render("b"), first)
 
 
-def test_camera_moves_reuse_the_medium(scene, render, monkeypatch):
+def test_camera_moves_reuse_the_medium(scene, render):
     lit(scene)
-    stats = []
-    finish = engine.BrumeEngine._finish
-    monkeypatch.setattr(engine.BrumeEngine, "_finish", lambda self, depsgraph, found, *times: (
-        stats.append(found), finish(self, depsgraph, found, *times)))
     render()
+    first = session.last_stats.stats
     scene.camera.location.z = 0.3
     render("b")
+    second = session.last_stats.stats
     medium = native.STAGES.index("medium")
     march = native.STAGES.index("march")
-    assert stats[0].stages[medium].revision == stats[1].stages[medium].revision
-    assert stats[0].stages[march].runs < stats[1].stages[march].runs
+    assert first.stages[medium].revision == second.stages[medium].revision
+    assert first.stages[march].runs < second.stages[march].runs
+
+
+def test_last_stats(scene, render):
+    lit(scene)
+    render()
+    stats, export_s, whole_s = session.last_stats
+    assert 0 < export_s < whole_s
+    assert stats.total_ms / 1000 < whole_s
+    assert stats.samples == scene.brume.samples
 
 
 def test_missing_vdb_leaves_the_rest(scene, render, reported):

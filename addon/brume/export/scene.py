@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import native
+from .. import native, properties
 from ..compat import identity
 from ..native import BrumeError
 from . import fluid, light, material, mesh, volume, world
@@ -155,6 +155,6 @@ def export(depsgraph, target):
     """Fills the target with the depsgraph's scene; what could not be shown is in its reports."""
     target.begin()
     scene = depsgraph.scene_eval
-    world.export(target, scene.world, scene.brume.world_reach)
+    world.export(target, scene.world, properties.world_reach(scene.brume))
     _Export(depsgraph, target).run()
     target.end()

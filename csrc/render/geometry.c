@@ -10,6 +10,8 @@
 
 /* m; squares of distances stay finite floats. */
 #define FARTHEST 1e15f
+#define HALF_MAX 65504.0f
+#define TRIANGLE_BYTES (24 * sizeof(float)) /* three corners of position, normal and uv */
 
 /* --- Caches ------------------------------------------------------------------------------- */
 
@@ -19,7 +21,7 @@ static brume_result upload_mesh(struct gpu *gpu, struct gpu_mesh *mesh, const st
     mesh->key = entry->key;
     mesh->revision = entry->revision;
     return buffer_init(&gpu->memory, &mesh->corners, FOR_MESH,
-                       (uint64_t)source->triangle_count * 24 * sizeof(float), source->corners,
+                       (uint64_t)source->triangle_count * TRIANGLE_BYTES, source->corners,
                        source->name);
 }
 
@@ -50,7 +52,7 @@ static brume_result upload_image(struct gpu *gpu, struct gpu_image *image,
         return fail(BRUME_E_MEMORY, "image '%s' of %d x %d pixels is larger than the driver's %d",
                     source->name, source->width, source->height, limit);
     /* The sun of an outdoor panorama passes what halves hold. */
-    const GLenum format = source->maximum > 65504.0f ? GL_RGBA32F : GL_RGBA16F;
+    const GLenum format = source->maximum > HALF_MAX ? GL_RGBA32F : GL_RGBA16F;
     TRY(texture_init(&gpu->memory, &image->texture, FOR_IMAGE, GL_TEXTURE_2D, format, source->width,
                      source->height, 1, mip_levels(source->width, source->height), source->name));
     const GLuint id = image->texture.id;
@@ -264,7 +266,9 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
         draw->material = (uint32_t)(entry - materials->entries) + 1;
         draw->base_image = base ? base->texture.id : 0;
         draw->roughness_image = rough ? rough->texture.id : 0;
-        draw->needs_fragments = material->alpha_mode != BRUME_ALPHA_OPAQUE;
+        draw->tinted = material->alpha_mode != BRUME_ALPHA_OPAQUE &&
+                       (material->transparent[0] != 1.0f || material->transparent[1] != 1.0f ||
+                        material->transparent[2] != 1.0f);
     }
 }
 
@@ -367,6 +371,27 @@ static void make_vertex_array(struct geometry *geometry)
     geometry->vertex_array = array;
 }
 
+uint64_t geometry_bytes(const struct snapshot *snapshot)
+{
+    const struct table *meshes = &snapshot->tables[BRUME_KIND_MESH];
+    const struct table *images = &snapshot->tables[BRUME_KIND_IMAGE];
+    const struct table *sets = &snapshot->tables[BRUME_KIND_INSTANCES];
+    uint64_t bytes = ((uint64_t)snapshot->tables[BRUME_KIND_MATERIAL].count + 1) *
+                     sizeof(struct gpu_material);
+    for (uint32_t i = 0; i < meshes->count; ++i)
+        bytes += TRIANGLE_BYTES *
+                 (uint64_t)((struct mesh_block *)meshes->entries[i].block)->triangle_count;
+    for (uint32_t i = 0; i < images->count; ++i) {
+        const struct image_block *image = (struct image_block *)images->entries[i].block;
+        const uint64_t texel = image->maximum > HALF_MAX ? 16 : 8;
+        bytes += (uint64_t)image->width * (uint64_t)image->height * texel * 4 / 3 + 16;
+    }
+    for (uint32_t i = 0; i < sets->count; ++i)
+        bytes += (sizeof(struct gpu_instance) + sizeof(uint32_t)) *
+                 (uint64_t)((struct instances_block *)sets->entries[i].block)->count;
+    return bytes;
+}
+
 brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,
                            const struct snapshot *snapshot, struct job_control *control)
 {
@@ -379,10 +404,12 @@ brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,
 }
 
 brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const struct gpu_draw *stage,
-                           uint32_t visibility, int depth_only)
+                           uint32_t visibility, enum geometry_pass pass)
 {
+    static const char *const stems[] = {
+        [GEOMETRY_GBUFFER] = "gbuffer", [GEOMETRY_SHADOW] = "shadow", [GEOMETRY_TINT] = "tint"};
     const struct program *program;
-    TRY(program_draw(&gpu->programs, depth_only ? "shadow" : "gbuffer", &program));
+    TRY(program_draw(&gpu->programs, stems[pass], &program));
     TRY(buffer_update(&gpu->memory, &geometry->stage_block, FOR_TARGET, sizeof *stage, stage,
                       "draw stage"));
     glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_STAGE, geometry->stage_block.id);
@@ -393,9 +420,15 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
     glVertexArrayVertexBuffer(geometry->vertex_array, 1, geometry->instance_numbers.id, 0, 4);
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER); /* reversed depth */
+    if (pass == GEOMETRY_TINT) {
+        glDepthMask(GL_FALSE);
+        glEnable(GL_BLEND);
+        glBlendFunc(GL_DST_COLOR, GL_ZERO);
+    }
     for (uint32_t i = 0; i < geometry->draw_count; ++i) {
         const struct draw *draw = &geometry->draws[i];
-        if ((draw->visibility & visibility) != visibility)
+        if ((draw->visibility & visibility) != visibility ||
+            (pass == GEOMETRY_TINT && !draw->tinted))
             continue;
         glVertexArrayVertexBuffer(geometry->vertex_array, 0, draw->corners, 0, 32);
         glBindTextureUnit(SLOT_MATERIAL_BASE, draw->base_image);
@@ -406,6 +439,8 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
                                           (GLsizei)draw->instance_count, draw->first_instance);
     }
     glDisable(GL_DEPTH_TEST);
+    glDisable(GL_BLEND);
+    glDepthMask(GL_TRUE);
     return BRUME_OK;
 }
 

@@ -27,7 +27,7 @@ struct draw {
     uint32_t first_instance, instance_count;
     uint32_t material;
     uint32_t visibility;
-    int needs_fragments; /* alpha or culling decides per fragment */
+    int tinted; /* colours what is seen through it */
 };
 
 struct geometry {
@@ -47,10 +47,17 @@ struct geometry {
 
 brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,
                            const struct snapshot *snapshot, struct job_control *control);
-/* Draws what has all bits of `visibility` with the bound framebuffer. depth_only: without a
- * fragment shader where a surface is whole. */
+enum geometry_pass {
+    GEOMETRY_GBUFFER = 0,
+    GEOMETRY_SHADOW = 1,
+    GEOMETRY_TINT = 2, /* multiplies by the colour of what is seen through; writes no depth */
+};
+
+/* Draws what has all bits of `visibility` with the bound framebuffer. */
 brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const struct gpu_draw *stage,
-                           uint32_t visibility, int depth_only);
+                           uint32_t visibility, enum geometry_pass pass);
+/* What geometry_sync will hold, once it is done. */
+uint64_t geometry_bytes(const struct snapshot *snapshot);
 const struct gpu_image *geometry_image(const struct geometry *geometry, uint64_t key);
 void geometry_finish(struct gpu *gpu, struct geometry *geometry);
 

@@ -133,6 +133,25 @@ static int layout_tiles(struct renderer *renderer, int limit)
     return used_columns <= columns;
 }
 
+static uint64_t tau_bytes(const struct renderer *renderer)
+{
+    const int *size = renderer->tau_size;
+    return (uint64_t)size[0] * (uint64_t)size[1] * (uint64_t)size[2] * NODE_BYTES;
+}
+
+uint64_t lattice_depth_bytes(const struct renderer *renderer, const brume_settings *settings)
+{
+    const uint64_t nodes = (uint64_t)settings->lattice_resolution + 2;
+    /* Twice: the last column of tiles may be nearly empty. */
+    return nodes * nodes * nodes * NODE_BYTES * 2 * ((uint64_t)renderer->shadows.light_count + 1);
+}
+
+uint64_t lattice_sky_bytes(const brume_settings *settings)
+{
+    const uint64_t nodes = (uint64_t)settings->lattice_resolution / 2 + 6;
+    return nodes * nodes * nodes * SKY_NODE_BYTES;
+}
+
 brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
                             const struct render_request *request)
 {
@@ -152,7 +171,6 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
     /* The sky's lattice needs a cell's size to march by, medium or not. */
     frame->medium_lower = (vec4){0, 0, 0, 1};
 
-    const uint64_t share = settings->memory_budget / 4;
     int resolution = settings->lattice_resolution;
     if (medium->dims[0]) {
         struct box box;
@@ -164,11 +182,13 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
         for (;; resolution = resolution * 3 / 4) {
             frame->lattice_lower = pack(medium->lower, nodes_of(&box, resolution,
                                                                 &frame->lattice_dims));
-            const uint64_t bytes = volume_of(&frame->lattice_dims) * NODE_BYTES *
-                                   renderer->shadows.light_count;
-            if ((bytes <= share && layout_tiles(renderer, gpu->context.info.max_texture_3d)) ||
-                resolution <= 4)
+            if (layout_tiles(renderer, gpu->context.info.max_texture_3d) &&
+                tau_bytes(renderer) <= renderer->shares.depth)
                 break;
+            if (resolution == 1)
+                return fail(BRUME_E_MEMORY, "the optical depths of %u lamps do not fit the memory "
+                                            "budget",
+                            renderer->shadows.light_count);
         }
         if (resolution < settings->lattice_resolution)
             job_warn(request->control, "LATTICE_COARSER",
@@ -188,7 +208,7 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
         int sky = resolution / 2 < 4 ? 4 : resolution / 2;
         for (;; sky = sky * 3 / 4) {
             frame->sky_lower = pack(box.lower, nodes_of(&box, sky, &frame->sky_dims));
-            if (volume_of(&frame->sky_dims) * SKY_NODE_BYTES <= share || sky <= 4)
+            if (volume_of(&frame->sky_dims) * SKY_NODE_BYTES <= renderer->shares.sky || sky <= 4)
                 break;
         }
     }

@@ -8,6 +8,9 @@
 
 /* Fills the lattice fields of renderer->frame, the tau tiles of the lights, renderer->tau_size.
  * Keeps the transport within its share of the budget, with a warning where that makes it coarser. */
+/* No lattice of these settings is larger. */
+uint64_t lattice_depth_bytes(const struct renderer *renderer, const brume_settings *settings);
+uint64_t lattice_sky_bytes(const brume_settings *settings);
 brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
                             const struct render_request *request);
 

@@ -13,6 +13,8 @@
 
 /* Steps of a ray through the world's medium where there is no lattice. */
 #define FOG_STEPS 24
+/* Between two pictures of a progressive job. */
+#define PICTURE_MS 500.0
 
 struct run {
     struct gpu *gpu;
@@ -95,7 +97,7 @@ static brume_result work_medium(struct run *run)
     const int32_t wanted = request->settings.medium_resolution;
     brume_result result =
         medium_build(volumes, table->count, wanted < useful ? wanted : useful,
-                     request->settings.memory_budget / 4 / MEDIUM_CELL_BYTES,
+                     run->renderer->shares.medium / MEDIUM_CELL_BYTES,
                      job_cancelled_callback, request->control, &lattice);
     free(volumes);
     if (result == BRUME_OK) {
@@ -146,8 +148,7 @@ static brume_result work_shadow(struct run *run)
     const struct render_request *request = run->request;
     job_report(request->control, BRUME_STAGE_SHADOW, 0.02f);
     TRY(shadows_layout(run->gpu, &renderer->shadows, request->snapshot, &request->settings,
-                       &renderer->geometry, request->settings.memory_budget / 3,
-                       request->control));
+                       &renderer->geometry, &renderer->shadow_plan, request->control));
     TRY(shadows_upload(run->gpu, &renderer->shadows));
     return shadows_render(run->gpu, &renderer->shadows, &renderer->geometry, request->control);
 }
@@ -218,14 +219,21 @@ static brume_result work_march(struct run *run, uint32_t sample)
                       &renderer->frame_block, run->request->control);
 }
 
+/* Reads the mean of the samples so far and makes it the newest picture. */
 static brume_result work_passes(struct run *run, uint32_t sample)
 {
-    (void)sample;
-    const struct render_request *request = run->request;
+    struct render_request *request = run->request;
+    struct picture *back = &request->back;
     for (uint32_t pass = 0; pass < BRUME_PASS_COUNT; ++pass)
-        if (request->pixels[pass])
-            TRY(view_read(&run->renderer->targets, &request->view, pass, request->view.samples,
-                          request->pixels[pass]));
+        if (back->pixels[pass])
+            TRY(view_read(&run->renderer->targets, &request->view, pass, sample + 1,
+                          back->pixels[pass]));
+    back->samples = sample + 1;
+    pthread_mutex_lock(&request->control->mutex);
+    const struct picture newest = *back;
+    *back = *request->front;
+    *request->front = newest;
+    pthread_mutex_unlock(&request->control->mutex);
     return context_check("reading the picture");
 }
 
@@ -241,6 +249,7 @@ static brume_result run_view(struct run *run)
     medium_textures_bind(&renderer->medium);
     shadows_bind(&renderer->shadows);
     transport_bind(&renderer->transport);
+    double next_picture = 0.0; /* the first sample at once */
     for (uint32_t sample = 0; sample < view->samples; ++sample) {
         TRY(stage_timed(run, BRUME_STAGE_GBUFFER, sample, work_gbuffer));
         TRY(stage_timed(run, BRUME_STAGE_SHADE, sample, work_shade));
@@ -248,12 +257,67 @@ static brume_result run_view(struct run *run)
         pthread_mutex_lock(&request->control->mutex);
         request->control->samples_done = sample + 1;
         pthread_mutex_unlock(&request->control->mutex);
+        if (view->progressive && sample + 1 < view->samples && clock_ms() > next_picture) {
+            TRY(stage_timed(run, BRUME_STAGE_PASSES, sample, work_passes));
+            next_picture = clock_ms() + PICTURE_MS;
+        }
     }
     for (int stage = BRUME_STAGE_GBUFFER; stage < BRUME_STAGE_COUNT; ++stage) {
         ++renderer->stages[stage].runs;
         ++renderer->stages[stage].revision;
     }
     return stage_timed(run, BRUME_STAGE_PASSES, view->samples - 1, work_passes);
+}
+
+/* --- The budget --------------------------------------------------------------------------- */
+
+/* The blocks of frame, stage and lattice pass, and the smallest of everything else. */
+#define FIXED_BYTES (256u << 10)
+
+static uint64_t product_bytes(const struct renderer *renderer)
+{
+    const struct medium_textures *medium = &renderer->medium;
+    const struct transport *transport = &renderer->transport;
+    return medium->scatter.bytes + medium->extinct.bytes + medium->emission.bytes +
+           medium->bricks.bytes + renderer->shadows.maps.bytes + transport->tau.bytes +
+           transport->sky[0].bytes + transport->sky[1].bytes + transport->sky[2].bytes;
+}
+
+/* Shares out what pictures, meshes and images leave. What was made under a larger share goes
+ * first, so that the budget holds at every moment. */
+static brume_result share_budget(struct run *run)
+{
+    struct renderer *renderer = run->renderer;
+    const uint64_t budget = run->request->settings.memory_budget;
+    const uint64_t taken = view_bytes(&run->request->view) +
+                           geometry_bytes(run->request->snapshot) + FIXED_BYTES;
+    if (taken >= budget)
+        return fail(BRUME_E_MEMORY,
+                    "picture, meshes and images alone need %.1f MiB of graphics memory; the "
+                    "memory budget is %.1f MiB",
+                    (double)taken / (1 << 20), (double)budget / (1 << 20));
+    const uint64_t rest = budget - taken;
+    renderer->shares = (struct shares){
+        .medium = rest / 4, .shadow = rest / 8 * 3, .depth = rest / 4, .sky = rest / 8};
+    view_forget(run->gpu, &renderer->targets, &run->request->view);
+    if (product_bytes(renderer) > rest) {
+        medium_textures_finish(run->gpu, &renderer->medium);
+        shadows_finish(run->gpu, &renderer->shadows);
+        transport_finish(run->gpu, &renderer->transport);
+        for (int stage = BRUME_STAGE_MEDIUM; stage <= BRUME_STAGE_TRANSPORT; ++stage)
+            renderer->stages[stage].signature = 0;
+    }
+    return BRUME_OK;
+}
+
+static uint64_t least(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
+static uint64_t cube(int32_t side)
+{
+    return (uint64_t)side * (uint64_t)side * (uint64_t)side;
 }
 
 /* --- All of it ---------------------------------------------------------------------------- */
@@ -291,31 +355,39 @@ brume_result renderer_run(struct gpu *gpu, struct renderer *renderer,
     const struct snapshot *snapshot = request->snapshot;
     const brume_settings *settings = &request->settings;
     const struct stage_record *stages = renderer->stages;
+    const struct shares *shares = &renderer->shares;
+    TRY(share_budget(&run));
     gpu->memory.peak = gpu->memory.total;
 
+    /* A share counts as an input only where it is less than what could be used: another picture's
+     * size then does not re-run what fits anyway. */
     const uint64_t upload[] = {snapshot->tables[BRUME_KIND_MESH].revision,
                                snapshot->tables[BRUME_KIND_INSTANCES].revision,
                                snapshot->tables[BRUME_KIND_MATERIAL].revision,
                                snapshot->tables[BRUME_KIND_IMAGE].revision};
     TRY(run_if_changed(&run, BRUME_STAGE_UPLOAD, upload, 4, work_upload));
     const uint64_t medium[] = {snapshot->tables[BRUME_KIND_VOLUME].revision,
-                               (uint64_t)settings->medium_resolution, settings->memory_budget};
+                               (uint64_t)settings->medium_resolution,
+                               least(shares->medium / MEDIUM_CELL_BYTES,
+                                     cube(settings->medium_resolution))};
     TRY(run_if_changed(&run, BRUME_STAGE_MEDIUM, medium, 3, work_medium));
+    TRY(shadows_plan(snapshot, settings, &renderer->geometry, shares->shadow,
+                     &renderer->shadow_plan));
     const uint64_t shadow[] = {stages[BRUME_STAGE_UPLOAD].revision,
                                snapshot->tables[BRUME_KIND_LIGHT].revision,
                                snapshot->world_revision,
-                               (uint64_t)settings->shadow_resolution,
-                               (uint64_t)settings->light_samples,
-                               (uint64_t)settings->world_samples,
-                               settings->memory_budget};
-    TRY(run_if_changed(&run, BRUME_STAGE_SHADOW, shadow, 7, work_shadow));
+                               (uint64_t)renderer->shadow_plan.side,
+                               renderer->shadow_plan.light_samples,
+                               renderer->shadow_plan.world_samples};
+    TRY(run_if_changed(&run, BRUME_STAGE_SHADOW, shadow, 6, work_shadow));
     const uint64_t transport[] = {stages[BRUME_STAGE_MEDIUM].revision,
                                   stages[BRUME_STAGE_SHADOW].revision,
                                   (uint64_t)settings->lattice_resolution,
                                   settings->method,
-                                  settings->memory_budget,
+                                  least(shares->depth, lattice_depth_bytes(renderer, settings)),
+                                  least(shares->sky, lattice_sky_bytes(settings)),
                                   float_bits(snapshot->world.reach)};
-    TRY(run_if_changed(&run, BRUME_STAGE_TRANSPORT, transport, 6, work_transport));
+    TRY(run_if_changed(&run, BRUME_STAGE_TRANSPORT, transport, 7, work_transport));
     const brume_result result = run_view(&run);
     fill_stats(&run, started);
     return result;

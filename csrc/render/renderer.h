@@ -14,6 +14,12 @@ struct stage_record {
     uint64_t revision, runs;
 };
 
+/* Bytes that each lattice and the shadow maps may take: what the budget leaves beside pictures,
+ * meshes and images. */
+struct shares {
+    uint64_t medium, shadow, depth, sky;
+};
+
 struct renderer {
     struct stage_record stages[BRUME_STAGE_COUNT];
     struct geometry geometry;
@@ -24,6 +30,8 @@ struct renderer {
     struct gpu_frame frame;
     struct buffer frame_block;
     int tau_size[3];
+    struct shares shares;
+    struct shadow_plan shadow_plan;
 };
 
 /* What one job asks for and gets. */
@@ -32,7 +40,8 @@ struct render_request {
     brume_settings settings; /* defaults filled in */
     brume_view view;
     struct job_control *control;
-    float *pixels[BRUME_PASS_COUNT]; /* given by the caller for each wanted pass */
+    struct picture *front; /* the newest whole picture, guarded by the control's mutex */
+    struct picture back;   /* the next one; owned by whoever made the request */
     brume_stats stats;
 };
 

@@ -12,6 +12,9 @@
 #include <string.h>
 
 #define MAX_LAYERS 2048
+#define COARSE_SIDE 128   /* texels: below this, fewer samples hurt less than coarser maps */
+#define LEAST_SIDE 16
+#define FEW_DIRECTIONS 16 /* of the world */
 
 static float radius_of(const struct geometry *geometry, float center[3])
 {
@@ -120,15 +123,15 @@ static uint32_t faces_of(const brume_light *light, uint32_t distant)
     return light->type == BRUME_LIGHT_SUN ? distant : light_faces(light);
 }
 
-static uint32_t layer_count(const struct snapshot *snapshot, uint32_t samples, uint32_t world,
-                            uint32_t distant)
+static uint64_t layer_count(const struct snapshot *snapshot, const struct shadow_plan *plan)
 {
     const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
-    uint32_t layers = world * distant;
+    uint64_t layers = (uint64_t)plan->world_samples * plan->distant;
     for (uint32_t i = 0; i < table->count; ++i) {
         const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
         if (light->cast_shadow)
-            layers += light_sample_count(light, samples) * faces_of(light, distant);
+            layers += (uint64_t)light_sample_count(light, plan->light_samples) *
+                      faces_of(light, plan->distant);
     }
     return layers;
 }
@@ -160,49 +163,83 @@ static int world_is_black(const brume_world *world)
     return world->color[0] <= 0.0f && world->color[1] <= 0.0f && world->color[2] <= 0.0f;
 }
 
+/* A world medium without limit lets nothing through from infinitely far. */
+static int distant_light(const struct snapshot *snapshot)
+{
+    return !(snapshot->world.has_volume && snapshot->world.reach < 0.0f);
+}
+
+static int casts(const struct geometry *geometry)
+{
+    return geometry->lower[0] <= geometry->upper[0];
+}
+
+brume_result shadows_plan(const struct snapshot *snapshot, const brume_settings *settings,
+                          const struct geometry *geometry, uint64_t budget,
+                          struct shadow_plan *plan)
+{
+    *plan = (struct shadow_plan){
+        .side = settings->shadow_resolution,
+        .light_samples = (uint32_t)settings->light_samples,
+        .distant = casts(geometry) ? distant_faces(geometry) : 1,
+    };
+    if (!world_is_black(&snapshot->world) && distant_light(snapshot))
+        plan->world_samples = (uint32_t)settings->world_samples;
+    for (;;) {
+        const int fewest = plan->light_samples == 1 && plan->world_samples <= FEW_DIRECTIONS;
+        uint64_t layers = casts(geometry) ? layer_count(snapshot, plan) : 0;
+        if (fewest && layers > MAX_LAYERS)
+            layers = MAX_LAYERS; /* the last lamps get none */
+        const uint64_t texels = (uint64_t)plan->side * (uint64_t)plan->side;
+        const int too_many = layers > MAX_LAYERS;
+        plan->layers = (uint32_t)layers;
+        if (!too_many && layers * (texels * 4 + sizeof(struct gpu_shadow_view)) <= budget)
+            return BRUME_OK;
+        /* Sharpness goes before softness, as far as it is plenty. */
+        if (!too_many && plan->side > (fewest ? LEAST_SIDE : COARSE_SIDE)) {
+            plan->side /= 2;
+        } else if (!fewest) {
+            plan->light_samples = plan->light_samples > 1 ? plan->light_samples / 2 : 1;
+            if (plan->world_samples > FEW_DIRECTIONS)
+                plan->world_samples /= 2;
+        } else {
+            return fail(BRUME_E_MEMORY, "the shadow maps of %u lamps do not fit the memory budget",
+                        snapshot->tables[BRUME_KIND_LIGHT].count);
+        }
+    }
+}
+
 brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
                             const struct snapshot *snapshot, const brume_settings *settings,
-                            const struct geometry *geometry, uint64_t budget,
+                            const struct geometry *geometry, const struct shadow_plan *plan,
                             struct job_control *control)
 {
     (void)gpu;
-    /* A world medium without limit lets nothing through from infinitely far. */
-    const int distant_light = !(snapshot->world.has_volume && snapshot->world.reach < 0.0f);
-    uint32_t wanted = (uint32_t)settings->light_samples;
-    uint32_t world_count = 0;
-    if (!world_is_black(&snapshot->world) && distant_light)
-        world_count = (uint32_t)settings->world_samples;
-    const int casters = geometry->lower[0] <= geometry->upper[0];
-
-    const uint32_t distant = casters ? distant_faces(geometry) : 1;
-    while (wanted > 1 && layer_count(snapshot, wanted, world_count, distant) > MAX_LAYERS)
-        wanted /= 2;
-    if (wanted < (uint32_t)settings->light_samples)
+    const int casters = casts(geometry);
+    const uint32_t wanted = plan->light_samples, world_count = plan->world_samples;
+    const uint32_t distant = plan->distant;
+    const int side = plan->side;
+    if (wanted < (uint32_t)settings->light_samples ||
+        (world_count && world_count < (uint32_t)settings->world_samples))
         job_warn(control, "LIGHT_SAMPLES_FEWER",
-                 "%u shadow maps a lamp instead of %d: more than %d do not fit", wanted,
-                 settings->light_samples, MAX_LAYERS);
-    const uint32_t layers = layer_count(snapshot, wanted, world_count, distant);
-    if (layers > MAX_LAYERS)
-        return fail(BRUME_E_UNSUPPORTED, "%u lamps need more than %d shadow maps",
-                    snapshot->tables[BRUME_KIND_LIGHT].count, MAX_LAYERS);
-    int side = settings->shadow_resolution;
-    while (side > 64 && (uint64_t)layers * (uint64_t)side * (uint64_t)side * 4 > budget)
-        side /= 2;
+                 "%u shadow maps a lamp instead of %d, and %u for the world: no more fit", wanted,
+                 settings->light_samples, world_count);
     if (side < settings->shadow_resolution)
         job_warn(control, "SHADOWS_COARSER",
                  "shadow maps of %d instead of %d texels, to keep the memory budget", side,
                  settings->shadow_resolution);
-    TRY(allocate(shadows, snapshot, wanted, world_count, layers));
+    TRY(allocate(shadows, snapshot, wanted, world_count, plan->layers));
     shadows->side = side;
     shadows->world_faces = distant;
 
     const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
-    uint32_t next_sample = 0, next_layer = 0;
+    const uint32_t lamp_layers = casters ? plan->layers - world_count * distant : 0;
+    uint32_t next_sample = 0, next_layer = 0, left_out = 0;
     for (uint32_t i = 0; i < table->count; ++i) {
         const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
         struct gpu_light *out = &shadows->lights[i];
         light_to_gpu(light, out);
-        if (light->type == BRUME_LIGHT_SUN && !distant_light)
+        if (light->type == BRUME_LIGHT_SUN && !distant_light(snapshot))
             out->radiance = (vec4){0};
         const uint32_t count = light_sample_count(light, wanted);
         const uint32_t faces = faces_of(light, distant);
@@ -214,6 +251,10 @@ brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
             light_sample(light, out, s, count, sample);
             if (!light->cast_shadow || !casters)
                 continue;
+            if (next_layer + faces > lamp_layers) {
+                ++left_out;
+                continue;
+            }
             sample->position.w = (float)next_layer;
             if (light->type == BRUME_LIGHT_SUN)
                 distant_views(geometry, faces, &sample->position, side,
@@ -223,6 +264,9 @@ brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
             next_layer += faces;
         }
     }
+    if (left_out)
+        job_warn(control, "SHADOWS_LEFT_OUT",
+                 "%u lamps cast no shadow: there is room for %d shadow maps", left_out, MAX_LAYERS);
     shadows->world_first = next_sample;
     shadows->world_count = world_count;
     if (world_count) {
@@ -255,10 +299,11 @@ brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows)
     TRY(buffer_update(memory, &shadows->view_buffer, FOR_SHADOW,
                       shadows->view_count * sizeof *shadows->views, shadows->views,
                       "shadow views"));
+    /* A sampler wants a texture, even where nothing casts a shadow. */
     const int layers = shadows->view_count ? (int)shadows->view_count : 1;
+    const int side = shadows->view_count ? shadows->side : 1;
     return texture_ensure(memory, &shadows->maps, FOR_SHADOW, GL_TEXTURE_2D_ARRAY,
-                          GL_DEPTH_COMPONENT32F, shadows->side, shadows->side, layers, 1,
-                          "shadow maps");
+                          GL_DEPTH_COMPONENT32F, side, side, layers, 1, "shadow maps");
 }
 
 brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,
@@ -288,6 +333,8 @@ brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geo
         job_report(control, BRUME_STAGE_SHADOW, 0.02f + 0.08f * (float)(i + 1) /
                                                             (float)shadows->view_count);
     }
+    /* A texture attached lives on after its deletion. */
+    glNamedFramebufferTexture(shadows->framebuffer, GL_DEPTH_ATTACHMENT, 0, 0);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     return BRUME_OK;
 }

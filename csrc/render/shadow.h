@@ -19,11 +19,23 @@ struct shadows {
     GLuint framebuffer;
 };
 
-/* Lights, samples and shadow views from the snapshot, for casters within the geometry's bounds.
- * budget: bytes that the maps may take; their side is halved until it is kept. */
+/* How many maps of what size: as the settings wish, or what fits. */
+struct shadow_plan {
+    int side;
+    uint32_t light_samples, world_samples;
+    uint32_t distant; /* maps of a distant light */
+    uint32_t layers;
+};
+
+/* budget: bytes that the maps may take. Arithmetic alone. */
+brume_result shadows_plan(const struct snapshot *snapshot, const brume_settings *settings,
+                          const struct geometry *geometry, uint64_t budget,
+                          struct shadow_plan *plan);
+/* Lights, samples and shadow views from the snapshot, for casters within the geometry's bounds;
+ * warns where the plan falls short of the settings. */
 brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
                             const struct snapshot *snapshot, const brume_settings *settings,
-                            const struct geometry *geometry, uint64_t budget,
+                            const struct geometry *geometry, const struct shadow_plan *plan,
                             struct job_control *control);
 /* Uploads them: the tiles in lights[].info may have been set in between. */
 brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows);

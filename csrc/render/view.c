@@ -108,6 +108,25 @@ static uint32_t pass_count(const brume_view *view)
     return (uint32_t)__builtin_popcount(view->passes & ((1u << PASS_COUNT) - 1u));
 }
 
+static uint64_t accumulation_bytes(const brume_view *view)
+{
+    return (uint64_t)view->width * (uint64_t)view->height *
+           (VIEW_PASS_PIXEL_BYTES * (uint64_t)pass_count(view));
+}
+
+uint64_t view_bytes(const brume_view *view)
+{
+    return (uint64_t)view->width * (uint64_t)view->height * VIEW_PIXEL_BYTES +
+           accumulation_bytes(view);
+}
+
+void view_forget(struct gpu *gpu, struct view_targets *targets, const brume_view *view)
+{
+    if (targets->normal.width != view->width || targets->normal.height != view->height ||
+        targets->accumulation.bytes != accumulation_bytes(view))
+        view_finish(gpu, targets);
+}
+
 brume_result view_begin(struct gpu *gpu, struct view_targets *targets, const brume_view *view)
 {
     struct {
@@ -119,11 +138,14 @@ brume_result view_begin(struct gpu *gpu, struct view_targets *targets, const bru
         {&targets->diffuse, GL_RGBA16F, GL_COLOR_ATTACHMENT1, "diffuse reflectance"},
         {&targets->specular, GL_RGBA16F, GL_COLOR_ATTACHMENT2, "specular reflectance"},
         {&targets->emission, GL_RGBA16F, GL_COLOR_ATTACHMENT3, "emission"},
+        {&targets->tint, GL_RGBA16F, GL_NONE, "tint of what is seen through"},
         {&targets->depth, GL_DEPTH_COMPONENT32F, GL_DEPTH_ATTACHMENT, "depth"},
         {&targets->surface, GL_RGBA32F, GL_NONE, "surface radiance"},
     };
-    if (!targets->framebuffer)
+    if (!targets->framebuffer) {
         glCreateFramebuffers(1, &targets->framebuffer);
+        glCreateFramebuffers(1, &targets->tint_framebuffer);
+    }
     for (size_t i = 0; i < sizeof list / sizeof *list; ++i) {
         TRY(texture_ensure(&gpu->memory, list[i].texture, FOR_TARGET, GL_TEXTURE_2D, list[i].format,
                            view->width, view->height, 1, 1, list[i].label));
@@ -134,12 +156,13 @@ brume_result view_begin(struct gpu *gpu, struct view_targets *targets, const bru
     static const GLenum buffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
                                      GL_COLOR_ATTACHMENT2, GL_COLOR_ATTACHMENT3};
     glNamedFramebufferDrawBuffers(targets->framebuffer, 4, buffers);
+    glNamedFramebufferTexture(targets->tint_framebuffer, GL_COLOR_ATTACHMENT0, targets->tint.id, 0);
+    glNamedFramebufferTexture(targets->tint_framebuffer, GL_DEPTH_ATTACHMENT, targets->depth.id, 0);
     if (glCheckNamedFramebufferStatus(targets->framebuffer, GL_FRAMEBUFFER) !=
         GL_FRAMEBUFFER_COMPLETE)
         return fail(BRUME_E_GPU, "the driver refuses a %d x %d framebuffer", view->width,
                     view->height);
-    const uint64_t bytes = (uint64_t)view->width * (uint64_t)view->height *
-                           (VIEW_PASS_PIXEL_BYTES * (uint64_t)pass_count(view));
+    const uint64_t bytes = accumulation_bytes(view);
     if (targets->accumulation.bytes != bytes) {
         buffer_finish(&gpu->memory, &targets->accumulation);
         TRY(buffer_init(&gpu->memory, &targets->accumulation, FOR_TARGET, bytes, NULL,
@@ -152,19 +175,23 @@ brume_result view_begin(struct gpu *gpu, struct view_targets *targets, const bru
 brume_result view_gbuffer(struct gpu *gpu, struct view_targets *targets, struct geometry *geometry,
                           const brume_view *view, uint32_t sample)
 {
-    static const float zero[4];
+    static const float zero[4], white[4] = {1.0f, 1.0f, 1.0f, 1.0f};
     glBindFramebuffer(GL_FRAMEBUFFER, targets->framebuffer);
     glViewport(0, 0, view->width, view->height);
     for (int i = 0; i < 4; ++i)
         glClearNamedFramebufferfv(targets->framebuffer, GL_COLOR, i, zero);
     glClearNamedFramebufferfv(targets->framebuffer, GL_DEPTH, 0, zero);
     const struct gpu_draw stage = camera_draw(view, sample);
-    TRY(geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_CAMERA, 0));
+    TRY(geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_CAMERA, GEOMETRY_GBUFFER));
+    glBindFramebuffer(GL_FRAMEBUFFER, targets->tint_framebuffer);
+    glClearNamedFramebufferfv(targets->tint_framebuffer, GL_COLOR, 0, white);
+    TRY(geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_CAMERA, GEOMETRY_TINT));
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glBindTextureUnit(SLOT_GBUFFER_NORMAL, targets->normal.id);
     glBindTextureUnit(SLOT_GBUFFER_DIFFUSE, targets->diffuse.id);
     glBindTextureUnit(SLOT_GBUFFER_SPECULAR, targets->specular.id);
     glBindTextureUnit(SLOT_GBUFFER_EMISSION, targets->emission.id);
+    glBindTextureUnit(SLOT_GBUFFER_TINT, targets->tint.id);
     return BRUME_OK;
 }
 
@@ -202,6 +229,30 @@ brume_result view_march(struct gpu *gpu, struct view_targets *targets, const bru
     return BRUME_OK;
 }
 
+brume_result picture_init(struct picture *picture, const brume_view *view)
+{
+    memset(picture, 0, sizeof *picture);
+    for (uint32_t pass = 0; pass < BRUME_PASS_COUNT; ++pass) {
+        if (!(view->passes & (1u << pass)))
+            continue;
+        picture->pixels[pass] = malloc((size_t)view->width * (size_t)view->height *
+                                       brume_pass_channels(pass) * sizeof(float));
+        if (!picture->pixels[pass]) {
+            picture_finish(picture);
+            return fail(BRUME_E_MEMORY, "no memory for a picture of %d x %d", view->width,
+                        view->height);
+        }
+    }
+    return BRUME_OK;
+}
+
+void picture_finish(struct picture *picture)
+{
+    for (int pass = 0; pass < BRUME_PASS_COUNT; ++pass)
+        free(picture->pixels[pass]);
+    memset(picture, 0, sizeof *picture);
+}
+
 brume_result view_read(struct view_targets *targets, const brume_view *view, uint32_t pass,
                        uint32_t samples, float *pixels)
 {
@@ -230,10 +281,13 @@ void view_finish(struct gpu *gpu, struct view_targets *targets)
     texture_finish(memory, &targets->diffuse);
     texture_finish(memory, &targets->specular);
     texture_finish(memory, &targets->emission);
+    texture_finish(memory, &targets->tint);
     texture_finish(memory, &targets->depth);
     texture_finish(memory, &targets->surface);
     buffer_finish(memory, &targets->accumulation);
-    if (targets->framebuffer)
+    if (targets->framebuffer) {
         glDeleteFramebuffers(1, &targets->framebuffer);
+        glDeleteFramebuffers(1, &targets->tint_framebuffer);
+    }
     memset(targets, 0, sizeof *targets);
 }

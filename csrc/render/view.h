@@ -6,14 +6,18 @@
 #include "render/geometry.h"
 
 struct view_targets {
-    struct texture normal, diffuse, specular, emission, depth, surface;
+    struct texture normal, diffuse, specular, emission, tint, depth, surface;
     struct buffer accumulation;
-    GLuint framebuffer;
+    GLuint framebuffer, tint_framebuffer;
 };
 
-/* Bytes of a pixel: four attachments, depth, the surfaces' radiance, and a vec4 a pass. */
-#define VIEW_PIXEL_BYTES 60
+/* Bytes of a pixel: five attachments, depth, the surfaces' radiance, and a vec4 a pass. */
+#define VIEW_PIXEL_BYTES 68
 #define VIEW_PASS_PIXEL_BYTES 16
+
+uint64_t view_bytes(const brume_view *view);
+/* Frees targets that are not of this view's size, before anything else takes their memory. */
+void view_forget(struct gpu *gpu, struct view_targets *targets, const brume_view *view);
 
 /* The camera's part of the frame's block, for one sample of a pixel. */
 void view_frame(const brume_view *view, uint32_t sample, struct gpu_frame *frame);
@@ -26,6 +30,15 @@ brume_result view_shade(struct gpu *gpu, struct view_targets *targets, const bru
 brume_result view_march(struct gpu *gpu, struct view_targets *targets, const brume_view *view,
                         struct gpu_frame *frame, struct buffer *frame_block,
                         struct job_control *control);
+/* The passes as floats in main memory. */
+struct picture {
+    float *pixels[BRUME_PASS_COUNT]; /* width * height * channels; NULL: not wanted */
+    uint32_t samples;                /* that it is the mean of; 0: nothing in it yet */
+};
+
+brume_result picture_init(struct picture *picture, const brume_view *view);
+void picture_finish(struct picture *picture);
+
 /* The mean over the samples of one pass, pixels * channels floats. */
 brume_result view_read(struct view_targets *targets, const brume_view *view, uint32_t pass,
                        uint32_t samples, float *pixels);

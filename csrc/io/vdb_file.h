@@ -2,8 +2,8 @@
 /* The bytes of a .vdb file: its table of grids, and the check that one grid's tree is whole. Any
  * thread.
  *
- * OpenVDB trusts its input: in 10.0 a damaged block length makes it write past a buffer, a damaged
- * Blosc header makes it read past one, and a damaged string length allocates gigabytes. So nothing
+ * OpenVDB trusts its input: in 10.0 a damaged block length makes it write past a buffer and crash,
+ * Blosc is not told how many bytes a block has, and a damaged string length allocates 4 GiB. Nothing
  * of a file reaches OpenVDB before the walk below, which follows the layout of file versions 222
  * (2013) and later, has found every length, mask and position in order. The walk reads from memory
  * that is then handed to OpenVDB, so a file rewritten meanwhile cannot differ from what was

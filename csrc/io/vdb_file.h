@@ -4,7 +4,7 @@
  *
  * OpenVDB trusts its input: in 10.0 a damaged block length makes it write past a buffer and crash,
  * Blosc is not told how many bytes a block has, and a damaged string length allocates 4 GiB.
- * Nothing of a file reaches OpenVDB before the walk below, which follows the layout of file versions
+ * Nothing of a file reaches OpenVDB before the walk below, which follows the layout of versions
  * 222 (2013) and later, has found every length, mask and position in order. The walk reads from
  * memory that is then handed to OpenVDB, so a file rewritten meanwhile cannot differ from what was
  * checked.

@@ -347,17 +347,16 @@ static void fill_stats(struct run *run, double started)
     stats->samples = run->request->view.samples;
 }
 
-brume_result renderer_run(struct gpu *gpu, struct renderer *renderer,
-                          struct render_request *request)
+static brume_result run_stages(struct run *run)
 {
-    struct run run = {gpu, renderer, request};
-    const double started = clock_ms();
+    struct renderer *renderer = run->renderer;
+    const struct render_request *request = run->request;
     const struct snapshot *snapshot = request->snapshot;
     const brume_settings *settings = &request->settings;
     const struct stage_record *stages = renderer->stages;
     const struct shares *shares = &renderer->shares;
-    TRY(share_budget(&run));
-    gpu->memory.peak = gpu->memory.total;
+    TRY(share_budget(run));
+    run->gpu->memory.peak = run->gpu->memory.total;
 
     /* A share counts as an input only where it is less than what could be used: another picture's
      * size then does not re-run what fits anyway. */
@@ -365,12 +364,12 @@ brume_result renderer_run(struct gpu *gpu, struct renderer *renderer,
                                snapshot->tables[BRUME_KIND_INSTANCES].revision,
                                snapshot->tables[BRUME_KIND_MATERIAL].revision,
                                snapshot->tables[BRUME_KIND_IMAGE].revision};
-    TRY(run_if_changed(&run, BRUME_STAGE_UPLOAD, upload, 4, work_upload));
+    TRY(run_if_changed(run, BRUME_STAGE_UPLOAD, upload, 4, work_upload));
     const uint64_t medium[] = {snapshot->tables[BRUME_KIND_VOLUME].revision,
                                (uint64_t)settings->medium_resolution,
                                least(shares->medium / MEDIUM_CELL_BYTES,
                                      cube(settings->medium_resolution))};
-    TRY(run_if_changed(&run, BRUME_STAGE_MEDIUM, medium, 3, work_medium));
+    TRY(run_if_changed(run, BRUME_STAGE_MEDIUM, medium, 3, work_medium));
     TRY(shadows_plan(snapshot, settings, &renderer->geometry, shares->shadow,
                      &renderer->shadow_plan));
     const uint64_t shadow[] = {stages[BRUME_STAGE_UPLOAD].revision,
@@ -379,7 +378,7 @@ brume_result renderer_run(struct gpu *gpu, struct renderer *renderer,
                                (uint64_t)renderer->shadow_plan.side,
                                renderer->shadow_plan.light_samples,
                                renderer->shadow_plan.world_samples};
-    TRY(run_if_changed(&run, BRUME_STAGE_SHADOW, shadow, 6, work_shadow));
+    TRY(run_if_changed(run, BRUME_STAGE_SHADOW, shadow, 6, work_shadow));
     const uint64_t transport[] = {stages[BRUME_STAGE_MEDIUM].revision,
                                   stages[BRUME_STAGE_SHADOW].revision,
                                   (uint64_t)settings->lattice_resolution,
@@ -387,9 +386,17 @@ brume_result renderer_run(struct gpu *gpu, struct renderer *renderer,
                                   least(shares->depth, lattice_depth_bytes(renderer, settings)),
                                   least(shares->sky, lattice_sky_bytes(settings)),
                                   float_bits(snapshot->world.reach)};
-    TRY(run_if_changed(&run, BRUME_STAGE_TRANSPORT, transport, 7, work_transport));
-    const brume_result result = run_view(&run);
-    fill_stats(&run, started);
+    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 7, work_transport));
+    return run_view(run);
+}
+
+brume_result renderer_run(struct gpu *gpu, struct renderer *renderer,
+                          struct render_request *request)
+{
+    struct run run = {gpu, renderer, request};
+    const double started = clock_ms();
+    const brume_result result = run_stages(&run);
+    fill_stats(&run, started); /* of a job that failed, too */
     return result;
 }
 

@@ -32,6 +32,8 @@
                      expected_, (double)(share), 100.0 * (value_ / expected_ - 1.0));              \
     } while (0)
 
+#pragma GCC diagnostic ignored "-Wunused-function" /* no test uses all of this */
+
 static brume_device *device;
 
 static int open_device(void **state)
@@ -152,6 +154,41 @@ static void add_sun(brume_scene *scene, uint64_t key, const float direction[3])
                        .cast_shadow = 1};
     placed(origin, direction, sun.world_from_light);
     assert_ok(brume_scene_set_light(scene, key, &sun));
+}
+
+/* A white lamp of that power at a point, to be changed and set. */
+static brume_light point_lamp(const float from[3], float watts)
+{
+    static const float along[3] = {0, 0, -1};
+    brume_light lamp = {.name = "lamp",
+                        .power = {watts, watts, watts},
+                        .diffuse_factor = 1,
+                        .specular_factor = 1,
+                        .volume_factor = 1,
+                        .type = BRUME_LIGHT_POINT,
+                        .cast_shadow = 1};
+    placed(from, along, lamp.world_from_light);
+    return lamp;
+}
+
+/* A white matt square of that side, across a direction: mesh, material and instances of the key. */
+static void add_plate(brume_scene *scene, uint64_t key, const float center[3],
+                      const float direction[3], float side)
+{
+    static const uint32_t triangles[6] = {0, 1, 2, 0, 2, 3};
+    const float h = 0.5f * side;
+    const float square[12] = {-h, -h, 0, h, -h, 0, h, h, 0, -h, h, 0};
+    float matrix[16];
+    placed(center, direction, matrix);
+    const brume_material white = {.diffuse = {1, 1, 1}, .roughness = 1, .alpha = 1};
+    const brume_mesh mesh = {.name = "plate", .positions = square, .triangles = triangles,
+                             .materials = &key, .vertex_count = 4, .triangle_count = 2,
+                             .material_count = 1};
+    const brume_instances instances = {.world_from_object = matrix, .mesh = key, .count = 1,
+                                       .visibility = BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW};
+    assert_ok(brume_scene_set_material(scene, key, &white));
+    assert_ok(brume_scene_set_mesh(scene, key, &mesh));
+    assert_ok(brume_scene_set_instances(scene, key, &instances));
 }
 
 /* The inverse of a rigid matrix. */

@@ -7,12 +7,14 @@
 #include "lib/sky.glsl"
 #include "lib/world.glsl"
 #include "lib/phase.glsl"
+#include "lib/lamp.glsl"
 
 layout(local_size_x = GROUP_PIXELS, local_size_y = GROUP_PIXELS) in;
 
 layout(binding = SLOT_GBUFFER_NORMAL) uniform sampler2D gbuffer_normal;
 layout(binding = SLOT_GBUFFER_SPECULAR) uniform sampler2D gbuffer_specular;
 layout(binding = SLOT_GBUFFER_EMISSION) uniform sampler2D gbuffer_emission;
+layout(binding = SLOT_GBUFFER_TINT) uniform sampler2D gbuffer_tint;
 layout(binding = SLOT_SURFACE) uniform sampler2D surface_radiance;
 
 layout(std430, binding = SLOT_ACCUMULATION) buffer accumulation_block
@@ -239,18 +241,22 @@ void main()
     march_state state = march_state(vec3(0.0), vec3(0.0), vec3(1.0));
     march_media(state, ray, t_near, t_far, pixel);
 
-    vec3 surface = vec3(0.0), emission = state.emission, environment = vec3(0.0);
+    // What reaches the camera of what is behind the media and of what is seen through.
+    vec3 tint = texelFetch(gbuffer_tint, pixel, 0).rgb;
+    vec3 behind = state.transmittance * tint;
+    vec3 surface = vec3(0.0), environment = vec3(0.0);
+    vec3 emission = state.emission + tint * lamps_seen(ray, t_near, t_far, hit);
     float alpha = 1.0;
     bool holdout = hit && texelFetch(gbuffer_specular, pixel, 0).w != 0.0;
     if (holdout) {
-        alpha = 1.0 - dot(state.transmittance, vec3(1.0 / 3.0));
+        alpha = 1.0 - dot(behind, vec3(1.0 / 3.0));
     } else if (hit) {
-        surface = state.transmittance * texelFetch(surface_radiance, pixel, 0).rgb;
-        emission += state.transmittance * texelFetch(gbuffer_emission, pixel, 0).rgb;
+        surface = behind * texelFetch(surface_radiance, pixel, 0).rgb;
+        emission += behind * texelFetch(gbuffer_emission, pixel, 0).rgb;
     } else if (frame.clip.z != 0.0) {
-        alpha = 1.0 - dot(state.transmittance, vec3(1.0 / 3.0));
+        alpha = 1.0 - dot(behind, vec3(1.0 / 3.0));
     } else {
-        environment = state.transmittance * world_radiance(ray.direction, 0.0);
+        environment = behind * world_radiance(ray.direction, 0.0);
     }
 
     int index = pixel.y * frame.size.x + pixel.x;

@@ -26,6 +26,13 @@ float material_alpha(gpu_material material, vec4 base)
            ((material.flags.x & MATERIAL_ALPHA_IMAGE) != 0u ? base.a : 1.0);
 }
 
+// Shadow maps know no colour: what passes a tinted surface is thinned by its luminance instead.
+float material_shadow_alpha(gpu_material material, float alpha)
+{
+    return 1.0 - (1.0 - alpha) * min(dot(material.transparent.rgb, vec3(0.2126, 0.7152, 0.0722)),
+                                     1.0);
+}
+
 // PCG, as in lib/frame.glsl.
 uint alpha_hash(uint x)
 {
@@ -43,6 +50,8 @@ bool material_covers(gpu_material material, float alpha, vec2 pixel, uint surfac
     if ((material.flags.x & MATERIAL_ALPHA_BLEND) == 0u)
         return true;
     uint start = alpha_hash(uint(pixel.x) + alpha_hash(uint(pixel.y) + alpha_hash(surface)));
-    float lot = fract(float(start) * (1.0 / 4294967296.0) + float(seed) * 0.618033988749895);
+    // Another irrational than the world's directions follow: the samples that hit a surface must
+    // see them all.
+    float lot = fract(float(start) * (1.0 / 4294967296.0) + float(seed) * 0.41421356237);
     return lot < alpha;
 }

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The colour that a surface gives to what is seen through it, multiplied in any order.
+#version 450 core
+#include "lib/material.glsl"
+
+layout(std140, binding = SLOT_STAGE) uniform stage_block
+{
+    gpu_draw stage;
+};
+
+in vec2 uv;
+flat in uint material_number;
+flat in uint instance_number;
+
+layout(location = 0) out vec4 out_tint;
+
+void main()
+{
+    gpu_material material = materials[material_number];
+    float alpha = material_alpha(material, material_base(material, uv));
+    if (material_covers(material, alpha, gl_FragCoord.xy, instance_number, stage.info.x))
+        discard;
+    out_tint = vec4(material.transparent.rgb, 1.0);
+}

@@ -74,7 +74,7 @@ static brume_result set_medium(brume_scene *scene, const options *given,
     const float black = grids[GRID_TEMPERATURE] ? given->blackbody : 0.0f;
     const float *albedo = given->albedo, *emission = given->emission;
     enum { DENSITY, SCALE, SIGMA_T, ALBEDO, SIGMA_S, SIGMA_A, G, GLOW, EMISSION, FLAME, HEAT,
-           KELVIN, SQUARE, COLOR, BIAS, FACTOR };
+           KELVIN, ZERO, SQUARE, COLOR, BIAS, FACTOR };
     const brume_instruction instructions[] = {
         GRID(DENSITY, GRID_DENSITY),
         CONSTANT(SCALE, given->density_scale, given->density_scale, given->density_scale),
@@ -92,6 +92,8 @@ static brume_result set_medium(brume_scene *scene, const options *given,
         GRID(HEAT, GRID_TEMPERATURE),
         CONSTANT(KELVIN, given->kelvin, given->kelvin, given->kelvin),
         MULTIPLY(HEAT, HEAT, KELVIN),
+        CONSTANT(ZERO, 0.0f, 0.0f, 0.0f),
+        {.op = BRUME_OP_MAXIMUM, .dst = HEAT, .a = HEAT, .b = ZERO},
         {.op = BRUME_OP_BLACKBODY, .dst = COLOR, .a = HEAT},
         MULTIPLY(SQUARE, HEAT, HEAT),
         MULTIPLY(SQUARE, SQUARE, SQUARE),

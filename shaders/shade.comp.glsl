@@ -48,45 +48,95 @@ vec3 world_transmittance(vec3 p, vec3 towards, float within)
     return exp(-tau);
 }
 
-vec3 world_surface(surface s, vec3 p, ivec2 pixel)
+float world_shadow(gpu_light_sample w, vec3 p, vec3 normal)
 {
-    vec3 diffuse = vec3(0.0);
-    float seen = 0.0, seen_weight = 0.0;
-    vec3 mirror = reflect(-s.view, s.normal);
-    bool glossy = s.specular != vec3(0.0);
-    float within = pixel_random(pixel, 8u);
-    // A pixel's samples take every stride-th direction, which are spread as evenly as all are, from
-    // a start of its own: what a few directions do not resolve becomes grain rather than bands.
-    uint stride = max(frame.world.y / (frame.world.z * uint(frame.clip.w)), 1u);
-    uint start = pixel_hash(pixel, 7u);
+    return w.position.w < 0.0 ? 1.0
+                              : distant_shadow(int(w.position.w), frame.world.w, p, normal,
+                                               w.position.xyz);
+}
+
+// A step through the world's samples that visits all of them, each far from the last: prime to
+// their count, and near the share of a low-discrepancy sequence that no other lot follows.
+uint world_step(uint count)
+{
+    uint wanted = max(uint(0.8191725134 * float(count)), 1u);
+    for (;; ++wanted) {
+        uint a = count, b = wanted;
+        while (b != 0u) {
+            uint rest = a % b;
+            a = b;
+            b = rest;
+        }
+        if (a == 1u)
+            return wanted;
+    }
+}
+
+vec3 world_diffuse(surface s, vec3 p, ivec2 pixel, float within)
+{
+    vec3 sum = vec3(0.0);
+    // From a start of its own, so that what few directions do not resolve becomes grain, not bands.
+    uint start = pixel_hash(pixel, 7u) % frame.world.y;
+    uint first = uint(frame.size.z) * frame.world.z % frame.world.y;
+    uint stride = world_step(frame.world.y);
     for (uint i = 0u; i < frame.world.z; ++i) {
-        uint turn = start + (uint(frame.size.z) * frame.world.z + i) * stride;
-        gpu_light_sample w = light_samples[frame.world.x + turn % frame.world.y];
-        vec3 towards = w.position.xyz;
-        float cosine = dot(s.normal, towards);
-        if (cosine <= 0.0)
+        uint turn = (start + (first + i) * stride) % frame.world.y;
+        gpu_light_sample w = light_samples[frame.world.x + turn];
+        vec3 reflected = bsdf_diffuse(s, w.position.xyz);
+        if (reflected == vec3(0.0))
             continue;
-        float lit = w.position.w < 0.0 ? 1.0
-                                       : distant_shadow(int(w.position.w), frame.world.w, p,
-                                                        s.normal, towards);
-        float nearness = glossy ? pow(max(dot(mirror, towards), 0.0), 4.0) + 1e-3 : 0.0;
-        seen += lit * nearness;
-        seen_weight += nearness;
+        float lit = world_shadow(w, p, s.normal);
         if (lit > 0.0)
-            diffuse += bsdf_diffuse(s, towards) * w.weight.rgb * lit *
-                       world_transmittance(p, towards, within);
+            sum += reflected * w.weight.rgb *
+                   (lit * world_transmittance(p, w.position.xyz, within));
     }
-    diffuse *= float(frame.world.y) / float(frame.world.z);
-    vec3 specular = vec3(0.0);
-    if (glossy) {
-        // The mirror's part of the world, blurred by the roughness, as far as the samples around
-        // it are not hidden.
-        float levels = frame.world_color.w != 0.0 ? float(textureQueryLevels(world_image)) : 1.0;
-        float visible = seen_weight > 0.0 ? seen / seen_weight : 0.0;
-        specular = world_radiance(mirror, s.roughness * (levels - 2.0)) * bsdf_environment(s) *
-                   visible * world_transmittance(p, mirror, within);
+    return sum * (float(frame.world.y) / float(frame.world.z));
+}
+
+// Whether geometry hides the world in a direction, as far as the shadow maps of its samples tell:
+// the nearest of them to a direction drawn around it answers.
+float world_visible(vec3 p, vec3 normal, vec3 direction, vec3 lot)
+{
+    vec3 around = direction + (lot - 0.5) * (2.0 * inversesqrt(float(frame.world.y)));
+    float best = -2.0;
+    uint nearest = 0u;
+    for (uint i = 0u; i < frame.world.y; ++i) {
+        vec3 towards = light_samples[frame.world.x + i].position.xyz;
+        float nearness = dot(around, towards);
+        if (nearness > best && dot(normal, towards) > 0.0) {
+            best = nearness;
+            nearest = i;
+        }
     }
-    return diffuse + specular;
+    return best > -2.0 ? world_shadow(light_samples[frame.world.x + nearest], p, normal) : 1.0;
+}
+
+// One direction of the lobe a sample; the image is blurred by what the samples leave between them
+// (Krivanek and Colbert, "Real-time Shading with Filtered Importance Sampling", EGSR 2008).
+vec3 world_specular(surface s, vec3 p, ivec2 pixel, float within)
+{
+    if (s.specular == vec3(0.0))
+        return vec3(0.0);
+    vec2 lot = fract(vec2(pixel_hash(pixel, 21u), pixel_hash(pixel, 22u)) / 4294967296.0 +
+                     float(frame.size.z) * vec2(0.7548776662466927, 0.5698402909980532));
+    vec3 towards;
+    float density;
+    vec3 reflected = bsdf_sample(s, lot, towards, density);
+    if (reflected == vec3(0.0))
+        return vec3(0.0);
+    float lit = world_visible(p, s.normal, towards,
+                              vec3(pixel_random(pixel, 23u), pixel_random(pixel, 24u),
+                                   pixel_random(pixel, 25u)));
+    if (lit == 0.0)
+        return vec3(0.0);
+    float level = 0.0;
+    if (frame.world_color.w != 0.0) {
+        ivec2 size = textureSize(world_image, 0);
+        float texel = 4.0 * PI / float(size.x * size.y);
+        level = max(0.5 * log2(1.0 / (frame.clip.w * density * texel)), 0.0);
+    }
+    return reflected * world_radiance(towards, level) *
+           (lit * world_transmittance(p, towards, within));
 }
 
 void main()
@@ -108,8 +158,10 @@ void main()
         vec3 p = ray.origin + ray.direction * (normal_depth.w * ray.stretch);
         for (uint i = 0u; i < frame.counts.x; ++i)
             radiance += light_surface(s, p, lights[i], pixel, i);
-        if (frame.world.y > 0u && frame.fog_upper.w == 0.0)
-            radiance += world_surface(s, p, pixel);
+        if (frame.world.y > 0u && frame.fog_upper.w == 0.0) {
+            float within = pixel_random(pixel, 8u);
+            radiance += world_diffuse(s, p, pixel, within) + world_specular(s, p, pixel, within);
+        }
     }
     imageStore(surface_image, pixel, vec4(radiance, 0.0));
 }

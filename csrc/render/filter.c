@@ -36,5 +36,5 @@ void filter_offset(uint32_t index, float width, float offset[2])
     const double shares[2] = {fmod(0.5 + index * 0.7548776662466927, 1.0),
                               fmod(0.5 + index * 0.5698402909980532, 1.0)};
     for (int i = 0; i < 2; ++i)
-        offset[i] = (float)invert(shares[i]) * width;
+        offset[i] = (float)invert(shares[i]) * 2.0f * width;
 }

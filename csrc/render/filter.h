@@ -6,7 +6,8 @@
 #include <stdint.h>
 
 /* Offset from the pixel's centre, in pixels, of sample number index. Sample 0 is the centre. The
- * offsets are distributed as the Blackman-Harris filter of that width, so all weights are 1. */
+ * offsets are distributed as the Blackman-Harris filter, so all weights are 1. What Blender calls
+ * its width is the distance from the centre at which it ends. */
 void filter_offset(uint32_t index, float width, float offset[2]);
 
 #endif

@@ -81,12 +81,14 @@ brume_result world_samples(const brume_world *world, const struct image_block *i
         for (size_t i = 0; i < 3 * cells; ++i)
             table[i] = 1.0f;
     }
-    double mean = 0.0;
+    double mean = 0.0, whole[3] = {0.0}, found[3] = {0.0};
     for (int y = 0; y < TABLE_HEIGHT; ++y) {
         const double solid = sin(PI * (y + 0.5) / TABLE_HEIGHT);
         for (int x = 0; x < TABLE_WIDTH; ++x) {
             const float *rgb = table + 3 * (y * TABLE_WIDTH + x);
             mean += solid * (0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]);
+            for (int c = 0; c < 3; ++c)
+                whole[c] += solid * rgb[c];
         }
     }
     mean /= (double)cells * 2.0 / PI;
@@ -129,9 +131,21 @@ brume_result world_samples(const brume_world *world, const struct image_block *i
         const double weight = solid / (density * count);
         const float *rgb = table + 3 * (y * TABLE_WIDTH + x);
         out[i].position = (vec4){turned[0], turned[1], turned[2], -1.0f};
-        out[i].weight = (vec4){(float)(weight * rgb[0]) * world->color[0],
-                               (float)(weight * rgb[1]) * world->color[1],
-                               (float)(weight * rgb[2]) * world->color[2], 0.0f};
+        out[i].weight = (vec4){(float)(weight * rgb[0]), (float)(weight * rgb[1]),
+                               (float)(weight * rgb[2]), 0.0f};
+        for (int c = 0; c < 3; ++c)
+            found[c] += weight * rgb[c];
+    }
+    /* All together send exactly what the world does, in each colour. */
+    float scale[3];
+    for (int c = 0; c < 3; ++c) {
+        whole[c] *= 2.0 * PI * PI / (double)cells;
+        scale[c] = found[c] > 0.0 ? (float)(whole[c] / found[c]) * world->color[c] : 0.0f;
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        out[i].weight.x *= scale[0];
+        out[i].weight.y *= scale[1];
+        out[i].weight.z *= scale[2];
     }
     free(rows);
     free(table);

@@ -52,6 +52,6 @@ bool material_covers(gpu_material material, float alpha, vec2 pixel, uint surfac
     uint start = alpha_hash(uint(pixel.x) + alpha_hash(uint(pixel.y) + alpha_hash(surface)));
     // Another irrational than the world's directions follow: the samples that hit a surface must
     // see them all.
-    float lot = fract(float(start) * (1.0 / 4294967296.0) + float(seed) * 0.41421356237);
+    float lot = fract(float(start) * (1.0 / 4294967296.0) + float(seed) * 0.6710436067);
     return lot < alpha;
 }

@@ -449,7 +449,8 @@ typedef struct brume_view {
     float filter_width;              /* pixels, Blackman-Harris; 0: 1.5 */
     uint32_t film_transparent;       /* 1: the world is not drawn, alpha tells coverage */
     uint32_t passes;                 /* bits 1 << brume_pass; Combined always */
-    uint32_t reserved;
+    uint32_t progressive;            /* 1: brume_job_read works while the job runs, on the mean of
+                                        the samples so far, renewed twice a second */
 } brume_view;
 
 typedef enum brume_stage {
@@ -514,7 +515,8 @@ BRUME_API const char *brume_job_error(const brume_job *job); /* empty unless fai
 BRUME_API brume_result brume_job_warning(const brume_job *job, uint32_t index, const char **id,
                                          const char **sentence);
 BRUME_API brume_result brume_job_stats(const brume_job *job, brume_stats *out);
-/* Copies a pass of an ended job: width * height * channels floats, first row at the bottom. */
+/* Copies a pass of the newest picture: width * height * channels floats, first row at the bottom.
+ * BRUME_E_NOT_READY before there is one; a cancelled progressive job keeps its last. */
 BRUME_API brume_result brume_job_read(brume_job *job, uint32_t pass, float *pixels,
                                       uint64_t float_count);
 BRUME_API void brume_job_release(brume_job *job); /* cancels it if it still runs; NULL is fine */

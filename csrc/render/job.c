@@ -69,8 +69,7 @@ static void unreference(brume_job *job)
 {
     if (__atomic_sub_fetch(&job->references, 1, __ATOMIC_ACQ_REL) != 0)
         return;
-    for (int pass = 0; pass < BRUME_PASS_COUNT; ++pass)
-        free(job->pixels[pass]);
+    picture_finish(&job->picture);
     snapshot_finish(&job->snapshot);
     pthread_cond_destroy(&job->ended);
     job_control_finish(&job->control);
@@ -92,20 +91,6 @@ static void end(brume_job *job, brume_result result)
     pthread_mutex_unlock(&job->control.mutex);
 }
 
-static brume_result allocate_pixels(brume_job *job)
-{
-    for (uint32_t pass = 0; pass < BRUME_PASS_COUNT; ++pass) {
-        if (!(job->view.passes & (1u << pass)))
-            continue;
-        job->pixels[pass] = malloc((size_t)job->view.width * (size_t)job->view.height *
-                                   brume_pass_channels(pass) * sizeof(float));
-        if (!job->pixels[pass])
-            return fail(BRUME_E_MEMORY, "no memory for a picture of %d x %d", job->view.width,
-                        job->view.height);
-    }
-    return BRUME_OK;
-}
-
 /* On the device's thread. */
 static void run_job(struct gpu *gpu, void *user)
 {
@@ -113,7 +98,8 @@ static void run_job(struct gpu *gpu, void *user)
     struct render_request request = {.snapshot = &job->snapshot,
                                      .settings = job->settings,
                                      .view = job->view,
-                                     .control = &job->control};
+                                     .control = &job->control,
+                                     .front = &job->picture};
     pthread_mutex_lock(&job->control.mutex);
     job->state = BRUME_JOB_RUNNING;
     pthread_mutex_unlock(&job->control.mutex);
@@ -122,11 +108,12 @@ static void run_job(struct gpu *gpu, void *user)
     if (job_cancelled(&job->control))
         result = fail(BRUME_E_CANCELLED, "cancelled");
     if (result == BRUME_OK)
-        result = allocate_pixels(job);
-    if (result == BRUME_OK) {
-        memcpy(request.pixels, job->pixels, sizeof request.pixels);
+        result = picture_init(&job->picture, &job->view);
+    if (result == BRUME_OK)
+        result = picture_init(&request.back, &job->view);
+    if (result == BRUME_OK)
         result = renderer_run(gpu, &job->scene->renderer, &request);
-    }
+    picture_finish(&request.back);
     snapshot_finish(&job->snapshot); /* a picture that is kept keeps no scene alive */
     job->stats = request.stats;
     end(job, result);
@@ -220,16 +207,18 @@ static uint32_t state_of(brume_job *job)
 
 brume_result job_read(brume_job *job, uint32_t pass, float *pixels, uint64_t float_count)
 {
-    if (state_of(job) != BRUME_JOB_DONE)
-        return fail(BRUME_E_NOT_READY, "the job has no picture");
-    if (!job->pixels[pass])
-        return fail(BRUME_E_NOT_READY, "the job was not asked for the pass %s",
-                    brume_pass_name(pass));
     const uint64_t expected = (uint64_t)job->view.width * (uint64_t)job->view.height *
                               brume_pass_channels(pass);
     REQUIRE(float_count == expected);
-    memcpy(pixels, job->pixels[pass], expected * sizeof *pixels);
-    return BRUME_OK;
+    if (!(job->view.passes & (1u << pass)))
+        return fail(BRUME_E_NOT_READY, "the job was not asked for the pass %s",
+                    brume_pass_name(pass));
+    pthread_mutex_lock(&job->control.mutex);
+    const uint32_t samples = job->picture.samples;
+    if (samples)
+        memcpy(pixels, job->picture.pixels[pass], expected * sizeof *pixels);
+    pthread_mutex_unlock(&job->control.mutex);
+    return samples ? BRUME_OK : fail(BRUME_E_NOT_READY, "the job has no picture");
 }
 
 brume_result job_stats(brume_job *job, brume_stats *out)

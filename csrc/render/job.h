@@ -24,7 +24,7 @@ struct brume_job {
     uint32_t state;
     brume_result result;
     char error[1024];
-    float *pixels[BRUME_PASS_COUNT];
+    struct picture picture; /* the newest */
     brume_stats stats;
 };
 

@@ -13,6 +13,7 @@ from .properties import native_settings, passes_of
 POLL_MS = 30
 # A final render's status line changes at most this often, in seconds.
 STATUS_INTERVAL = 0.2
+PICTURE_INTERVAL = 1.0   # seconds between two pictures while a window shows the render
 
 
 def _told(id, sentence):
@@ -63,8 +64,9 @@ class BrumeEngine(bpy.types.RenderEngine):
             settings = native_settings(depsgraph.scene_eval.brume)
             job = stage.scene.render(settings, view)
             try:
-                if self._wait(job, view.samples):
+                if self._wait(job, view, result, passes):
                     self._write(result, job, passes)
+                    self.update_progress(1.0)
                     if not self.is_preview:
                         now = time.perf_counter()
                         self._finish(depsgraph, session.RenderStats(
@@ -93,12 +95,15 @@ class BrumeEngine(bpy.types.RenderEngine):
             clip_far=seen.clip_far, samples=4 if self.is_preview else settings.samples,
             seed=settings.seed, filter_width=scene_eval.render.filter_size,
             film_transparent=scene_eval.render.film_transparent,
-            passes=sum(1 << number for number, *_ in passes))
+            passes=sum(1 << number for number, *_ in passes),
+            progressive=not (self.is_preview or bpy.app.background))
         return view, passes
 
-    def _wait(self, job, samples):
-        """Follows the job to its end; False if the user broke it off."""
+    def _wait(self, job, view, result, passes):
+        """Follows the job to its end; False if the user broke it off. In a window the picture is
+        shown as it gets cleaner."""
         shown = 0.0
+        pictured = time.perf_counter()
         cancelled = False
         while True:
             status = job.wait(POLL_MS)
@@ -112,7 +117,13 @@ class BrumeEngine(bpy.types.RenderEngine):
             if now - shown > STATUS_INTERVAL:
                 shown = now
                 name = native.library().stage_name(status.stage).decode()
-                self.update_stats("", f"Brume | {name} | Sample {status.samples_done}/{samples}")
+                self.update_stats("", f"Brume | {name} | Sample {status.samples_done}/{view.samples}")
+            # The first picture is there once the second sample has begun.
+            if (view.progressive and status.samples_done > 1
+                    and now - pictured > PICTURE_INTERVAL):
+                pictured = now
+                self._write(result, job, passes[:1])
+                self.update_result(result)
         job.check(status)
         return status.state == native.JOB_DONE
 
@@ -125,7 +136,6 @@ class BrumeEngine(bpy.types.RenderEngine):
                 continue
             pixels = job.read(number)
             compat.set_pass(target, pixels[..., :len(channels)])
-        self.update_progress(1.0)
 
     def _warn(self, entries):
         """Reports what is not shown; in background, where reports are not seen, in print. The

@@ -156,7 +156,7 @@ class View(Structure):
     _fields_ = [("width", c_int32), ("height", c_int32), ("view_from_world", Mat4),
                 ("clip_from_view", Mat4), ("clip_near", c_float), ("clip_far", c_float),
                 ("samples", c_uint32), ("seed", c_uint32), ("filter_width", c_float),
-                ("film_transparent", c_uint32), ("passes", c_uint32), ("reserved", c_uint32)]
+                ("film_transparent", c_uint32), ("passes", c_uint32), ("progressive", c_uint32)]
 
 
 class StageStats(Structure):

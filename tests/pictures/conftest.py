@@ -3,7 +3,8 @@
 the differences of a run into the page of the method."""
 import os
 
-PAGE = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'docs', 'methods', 'opv.md')
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+PAGE = os.path.join(ROOT, 'docs', 'methods', 'opv.md')
 BEGIN, END = '<!-- pictures -->', '<!-- /pictures -->'
 
 differences = []    # (case, difference, tolerance), as the tests find them

@@ -4,6 +4,7 @@
 #include "base/log.h"
 #include "base/result.h"
 
+#include <dlfcn.h>
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
 #include <stdio.h>
@@ -136,9 +137,21 @@ static void APIENTRY on_message(GLenum source, GLenum type, GLuint id, GLenum se
     log_write(error ? BRUME_LOG_ERROR : BRUME_LOG_DEBUG, "OpenGL: %s", message);
 }
 
+/* libepoxy ends the process when it misses a library, so it is not asked before. */
+static int has_library(const char *name)
+{
+    return dlopen(name, RTLD_LAZY | RTLD_LOCAL) != NULL; /* stays: the driver wants it too */
+}
+
 brume_result context_init(struct context *context, uint32_t debug)
 {
     memset(context, 0, sizeof *context);
+    if (!has_library("libEGL.so.1"))
+        return fail(BRUME_E_NO_EGL, "the library libEGL.so.1 is not there: is a graphics driver (or "
+                                    "Mesa) installed?");
+    if (!has_library("libOpenGL.so.0") && !has_library("libGL.so.1"))
+        return fail(BRUME_E_NO_GL, "neither libOpenGL.so.0 nor libGL.so.1 is there: is a graphics "
+                                   "driver (or Mesa) installed?");
     int displays = 0;
     int found = try_devices(context, debug, &displays);
     if (!found && epoxy_has_egl_extension(NULL, "EGL_MESA_platform_surfaceless")) {

@@ -9,7 +9,7 @@
 #include <sched.h>
 #include <time.h>
 
-enum { PIXELS = 64, SAMPLES = 24, TRIES = 20 };
+enum { PIXELS = 32, SAMPLES = 16, TRIES = 20 };
 
 static const float origin[3];
 

@@ -3,18 +3,26 @@
 
 blender -b -P render_pair.py -- --engine CYCLES --seed 0 --out FOLDER CASE...
 
-writes FOLDER/CASE.npy, float32 (height, width, 3), linear, first row at the bottom. It goes the
-way that users go: bpy.ops.render.render to a float EXR, which is read back.
+writes FOLDER/CASE.npz: float32 (height, width, channels) by pass, linear, first row at the bottom.
+It goes the way that users go: bpy.ops.render.render to a multi-layer EXR, which is read back.
 """
 import argparse
 import os
 import sys
+from pathlib import Path
 
 import bpy
 import numpy as np
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path[:0] = [HERE, os.path.dirname(HERE)]
+import openexr
 from cases import CASES
+
+# Channels of a pass in the file, and the switch of the view layer that asks for it.
+PASSES = {'Combined': ('RGBA', 'use_pass_combined'), 'Depth': ('Z', 'use_pass_z'),
+          'Normal': ('XYZ', 'use_pass_normal'), 'Emit': ('RGB', 'use_pass_emit'),
+          'Env': ('RGB', 'use_pass_environment'), 'IndexOB': ('X', 'use_pass_object_index')}
 
 
 def set_up(scene, case):
@@ -25,15 +33,20 @@ def set_up(scene, case):
     missing = [name for name in case.lamps if name not in scene.objects]
     if missing:
         raise KeyError(f'{case.scene}.blend has no lamp {missing[0]}')
+    for layer in scene.view_layers:
+        layer.use_pass_z = False
+        for name in case.passes:
+            setattr(layer, PASSES[name][1], True)
     scene.camera.data.lens *= case.zoom
     render = scene.render
     render.resolution_x = render.resolution_y = case.size
     render.resolution_percentage = 100
     render.film_transparent = False
     render.use_border = render.use_compositing = render.use_sequencer = False
-    render.image_settings.file_format = 'OPEN_EXR'
-    render.image_settings.color_mode = 'RGBA'
+    render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+    render.image_settings.exr_codec = 'ZIP'
     render.image_settings.color_depth = '32'
+    case.apply(scene)
 
 
 def set_up_cycles(scene, case, seed):
@@ -47,19 +60,25 @@ def set_up_cycles(scene, case, seed):
     cycles.transmission_bounces = cycles.volume_bounces = 0
     cycles.transparent_max_bounces = 256
     cycles.volume_step_rate, cycles.volume_max_steps = case.step_rate, 65536
+    cycles.filter_width = scene.render.filter_size
+    for layer in scene.view_layers:
+        layer.use_pass_object_index = bool(case.groups)
 
 
 def render(scene, engine, path):
+    """Pass name -> pixels."""
     scene.render.engine = engine
     scene.render.filepath = path
     bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(path)
-    width, height = image.size
-    pixels = np.empty(width * height * 4, np.float32)
-    image.pixels.foreach_get(pixels)
-    bpy.data.images.remove(image)
+    channels = openexr.read(Path(path))
     os.remove(path)
-    return pixels.reshape(height, width, 4)[..., :3]
+    passes = {}
+    for name, (letters, _) in PASSES.items():
+        found = [value for letter in letters for channel, value in channels.items()
+                 if channel.endswith(f'.{name}.{letter}')]
+        if found:
+            passes[name] = np.flipud(np.stack(found, axis=-1))
+    return passes
 
 
 def main(arguments):
@@ -78,8 +97,8 @@ def main(arguments):
             set_up_cycles(scene, case, options.seed)
         elif options.engine == 'BRUME':
             scene.brume.samples = case.samples
-        picture = render(scene, options.engine, os.path.join(options.out, name + '.exr'))
-        np.save(os.path.join(options.out, name + '.npy'), picture)
+        passes = render(scene, options.engine, os.path.join(options.out, name + '.exr'))
+        np.savez(os.path.join(options.out, name + '.npz'), **passes)
 
 
 main(sys.argv[sys.argv.index('--') + 1:])

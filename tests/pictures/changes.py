@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What cases change in a scene, by name: its camera, film or world. Run inside Blender; also
+imported outside of it, where the functions' text goes into the references' digests."""
+
+
+def passes(scene):
+    """A pixel's samples all through its centre, as the first sample tells the depth."""
+    scene.render.filter_size = 0.01
+
+
+def orthographic(scene):
+    scene.camera.data.type = 'ORTHO'
+    scene.camera.data.ortho_scale = 5.0
+
+
+def shifted(scene):
+    camera = scene.camera.data
+    camera.sensor_fit, camera.sensor_height = 'VERTICAL', 20.0
+    camera.shift_x, camera.shift_y = 0.22, -0.10
+    scene.render.resolution_x, scene.render.resolution_y = 160, 96
+    scene.render.pixel_aspect_x = 1.25
+
+
+def clipped(scene):
+    """Both planes pass through things."""
+    scene.camera.data.clip_start, scene.camera.data.clip_end = 5.3, 7.6
+
+
+def border(scene):
+    scene.render.use_border, scene.render.use_crop_to_border = True, False
+    scene.render.border_min_x, scene.render.border_max_x = 0.25, 0.75
+    scene.render.border_min_y, scene.render.border_max_y = 0.125, 0.875
+
+
+def cropped(scene):
+    scene.render.use_border = scene.render.use_crop_to_border = True
+    scene.render.border_min_x, scene.render.border_max_x = 0.25, 0.75
+    scene.render.border_min_y, scene.render.border_max_y = 0.125, 0.875
+
+
+def film_transparent(scene):
+    """Without the floor: the sky shows around things and through them."""
+    scene.render.film_transparent = True
+    scene.objects['Floor'].hide_render = True
+
+
+def percentage(scene):
+    scene.render.resolution_x = scene.render.resolution_y = 256
+    scene.render.resolution_percentage = 50
+
+
+def inside(scene):
+    """The camera in the fog."""
+    scene.camera.location = (0.3, -0.5, 1.1)
+    scene.camera.rotation_euler = (1.5, 0.0, 0.35)
+    scene.camera.data.lens = 24.0
+
+
+def fog_on_film(scene):
+    scene.render.film_transparent = True
+    scene.objects['Floor'].hide_render = True
+
+
+def sky_alone(scene):
+    """A plain sky over matt things that hide it from one another."""
+    for thing in scene.objects:
+        if thing.type == 'LIGHT':
+            thing.hide_render = True
+    background = scene.world.node_tree.nodes['Background']
+    background.inputs['Color'].default_value = (0.4, 0.6, 1.0, 1.0)
+    background.inputs['Strength'].default_value = 1.0
+
+
+def lamps_seen(scene):
+    """From below, where the lamps shine into the camera."""
+    for thing in scene.objects:
+        if thing.type == 'LIGHT':
+            thing.visible_camera = True
+            thing.data.energy *= 0.1
+    scene.objects['Wall'].hide_render = True
+    scene.camera.location = (0.4, 4.5, 0.3)
+    scene.camera.rotation_euler = (1.95, 0.0, 3.14)
+    scene.camera.data.lens = 26.0
+
+
+def _mapping(scene):
+    return next(node for node in scene.world.node_tree.nodes if node.type == 'MAPPING')
+
+
+def hdr(scene):
+    node = next(node for node in scene.world.node_tree.nodes if node.type == 'TEX_ENVIRONMENT')
+    node.image.filepath = '//environment.hdr'
+    node.image.reload()
+
+
+def turned_as_point(scene):
+    _mapping(scene).inputs['Rotation'].default_value = (0.5, -0.35, 2.0)
+
+
+def turned_as_texture(scene):
+    _mapping(scene).vector_type = 'TEXTURE'
+    _mapping(scene).inputs['Rotation'].default_value = (0.5, -0.35, 2.0)

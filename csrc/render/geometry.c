@@ -224,7 +224,7 @@ static int is_flat(const struct mesh_block *mesh)
         thinnest = fminf(thinnest, mesh->upper[i] - mesh->lower[i]);
         longest = fmaxf(longest, mesh->upper[i] - mesh->lower[i]);
     }
-    return thinnest < 1e-3f * longest;
+    return thinnest <= 1e-3f * longest; /* a point, too */
 }
 
 static void write_instance(struct gpu_instance *out, const float *world_from_object,

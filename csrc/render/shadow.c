@@ -42,7 +42,8 @@ static void orthographic_view(const struct geometry *geometry, const float lower
     mat4_bounds(view, lower, upper, low, high);
     mat4_bounds(view, geometry->lower, geometry->upper, all_low, all_high);
     /* Square texels, and a texel of room for the filter at the rim. */
-    const float width = fmaxf(high[0] - low[0], high[1] - low[1]) * (1.0f + 4.0f / (float)side);
+    const float extent = fmaxf(fmaxf(high[0] - low[0], high[1] - low[1]), 1e-4f * radius);
+    const float width = extent * (1.0f + 4.0f / (float)side);
     const float x = 0.5f * (low[0] + high[0]), y = 0.5f * (low[1] + high[1]);
     const float near_ = -all_high[2] - 1e-3f * radius, far_ = -all_low[2] + 1e-3f * radius;
     mat4_orthographic(x - 0.5f * width, x + 0.5f * width, y - 0.5f * width, y + 0.5f * width, near_,

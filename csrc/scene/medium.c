@@ -15,6 +15,9 @@
 /* Parts of a cell this thin are rounding noise of the bounds, not worth a cell of their own. */
 #define SLIVER 1e-4
 
+/* No coefficient is larger, so that no sum is infinite: a nanometre of it is opaque. */
+#define MOST 1e9f
+
 /* --- The lattice's shape ------------------------------------------------------------------ */
 
 static double set_dims(struct medium_lattice *lattice, const double extent[3], double longest,
@@ -200,16 +203,16 @@ static void add_row(struct build *build, const struct share *share, int32_t i, i
         const float before = scatter[0] + scatter[1] + scatter[2];
         float added = 0.0f;
         for (int c = 0; c < 3; ++c) {
-            const float sigma_s = weight * samples->sigma_s[c];
+            const float sigma_s = fminf(weight * samples->sigma_s[c], MOST);
             scatter[c] += sigma_s;
-            extinct[c] += sigma_s + weight * samples->sigma_a[c];
+            extinct[c] += sigma_s + fminf(weight * samples->sigma_a[c], MOST);
             added += sigma_s;
         }
         if (added > 0.0f)
             scatter[3] += (samples->g - scatter[3]) * (added / (before + added));
         if (emission)
             for (int c = 0; c < 3; ++c) {
-                const float emitted = weight * samples->emission[c];
+                const float emitted = fminf(weight * samples->emission[c], MOST);
                 emission[4 * n + c] += emitted;
                 emits = emits || emitted > 0.0f;
             }

@@ -47,7 +47,8 @@ vec3 bsdf_specular(surface s, vec3 light)
     if (nl <= 0.0 || s.specular == vec3(0.0))
         return vec3(0.0);
     float alpha2 = bsdf_alpha2(s);
-    vec3 h = normalize(light + s.view);
+    vec3 h = light + s.view;
+    h *= inversesqrt(max(dot(h, h), 1e-12)); // a light exactly opposite the viewer has none
     float distribution = bsdf_distribution(clamp(dot(s.normal, h), 0.0, 1.0), alpha2);
     float masking = 1.0 / (bsdf_masking(nl, alpha2) + bsdf_masking(nv, alpha2));
     return bsdf_fresnel(s, dot(light, h)) * (distribution * masking / (4.0 * nv));

@@ -1,0 +1,262 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Radiometry of lamps in closed form: on a white matt plate, whose radiance is irradiance / pi, and
+ * in homogeneous media, where single scattering along a ray is one integral ("airlight"), done here
+ * by quadrature. Tolerances: 1 % where nothing is sampled, 2 % where jittered steps or lamp
+ * samples are. */
+#include "harness.h"
+
+#define PI 3.14159265358979
+
+static const float origin[3];
+static const float down[3] = {0, 0, -1};
+
+static const brume_settings settings = {.medium_resolution = 32, .lattice_resolution = 32,
+                                        .shadow_resolution = 256, .light_samples = 64,
+                                        .world_samples = 256};
+
+/* --- On a plate --------------------------------------------------------------------------- */
+
+static double plate_under(const brume_light *lamp, const brume_world *world, const float target[3])
+{
+    brume_scene *scene;
+    assert_ok(brume_scene_create(device, &scene));
+    add_plate(scene, 1, origin, down, 4.0f);
+    if (lamp)
+        assert_ok(brume_scene_set_light(scene, 1, lamp));
+    if (world)
+        assert_ok(brume_scene_set_world(scene, world));
+    brume_view view = orthographic_view(target, down, 0.001f, 0.25f, 4);
+    view.samples = 64;
+    brume_job *job = render(scene, &settings, &view);
+    float *pixels = read_pass(job, &view, BRUME_PASS_COMBINED);
+    const double value = middle(pixels, &view, 4, 1);
+    free(pixels);
+    brume_job_release(job);
+    brume_scene_destroy(scene);
+    return value;
+}
+
+static void sun_on_plate(void **state)
+{
+    (void)state;
+    static const float angles[] = {0.0f, 0.6f, 1.2f};
+    for (int i = 0; i < 3; ++i) {
+        const float along[3] = {sinf(angles[i]), 0, -cosf(angles[i])};
+        brume_light sun = point_lamp(origin, 2.0f);
+        sun.type = BRUME_LIGHT_SUN;
+        placed(origin, along, sun.world_from_light);
+        assert_close(plate_under(&sun, NULL, origin), 2.0 * cos(angles[i]) / PI, 0.01);
+        sun.angle = 0.1f; /* a wide sun gives the same irradiance */
+        assert_close(plate_under(&sun, NULL, origin), 2.0 * cos(angles[i]) / PI, 0.02);
+    }
+}
+
+/* Intensity P / (4 pi) W/sr: an isotropic source of P watts. */
+static void point_on_plate(void **state)
+{
+    (void)state;
+    static const float places[][3] = {{0, 0, 1}, {0, 0, 3}, {1, 0.5f, 2}};
+    for (int i = 0; i < 3; ++i) {
+        const brume_light lamp = point_lamp(places[i], 10.0f);
+        const float *q = places[i];
+        const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2];
+        const double expected = 10.0 / (4.0 * PI) * q[2] / (square * sqrt(square)) / PI;
+        assert_close(plate_under(&lamp, NULL, origin), expected, 0.01);
+        brume_light ball = lamp;
+        ball.radius = 0.05f;
+        assert_close(plate_under(&ball, NULL, origin), expected, 0.02);
+    }
+}
+
+static void spot_on_plate(void **state)
+{
+    (void)state;
+    brume_light spot = point_lamp((float[3]){0, 0, 2}, 10.0f);
+    spot.type = BRUME_LIGHT_SPOT;
+    spot.spot_angle = (float)(PI / 3);
+    const double on_axis = 10.0 / (4.0 * PI) / 4.0 / PI;
+    assert_close(plate_under(&spot, NULL, origin), on_axis, 0.01);
+    /* 30 degrees to each side: 2 tan(30 degrees) = 1.155 from the axis. */
+    assert_true(plate_under(&spot, NULL, (float[3]){1.13f, 0, 0}) > 0.3 * on_axis);
+    assert_true(plate_under(&spot, NULL, (float[3]){1.18f, 0, 0}) == 0.0);
+    assert_true(plate_under(&spot, NULL, (float[3]){0, -1.18f, 0}) == 0.0);
+    spot.spot_blend = 1.0f; /* the axis keeps its light */
+    assert_close(plate_under(&spot, NULL, origin), on_axis, 0.01);
+    assert_true(plate_under(&spot, NULL, (float[3]){1.0f, 0, 0}) < 0.3 * on_axis);
+}
+
+/* Radiance P / (4 A) on the whole lamp. A disk of radius r overhead at height h has the form factor
+ * r^2 / (r^2 + h^2); the rectangle's is a sum. */
+static void area_on_plate(void **state)
+{
+    (void)state;
+    static const double radii[] = {0.05, 0.5, 1.0};
+    for (int i = 0; i < 3; ++i) {
+        const double r = radii[i], h = 1.0;
+        brume_light lamp = point_lamp((float[3]){0, 0, (float)h}, 10.0f);
+        lamp.type = BRUME_LIGHT_ELLIPSE;
+        lamp.size[0] = lamp.size[1] = (float)(2 * r);
+        assert_close(plate_under(&lamp, NULL, origin),
+                     10.0 / (4.0 * PI * r * r) * r * r / (r * r + h * h), 0.02);
+
+        lamp.type = BRUME_LIGHT_RECTANGLE;
+        lamp.size[1] = 0.5f * lamp.size[0];
+        double form = 0.0; /* integral of cos cos / d^2 */
+        enum { CELLS = 200 };
+        const double a = lamp.size[0], b = lamp.size[1];
+        for (int j = 0; j < CELLS; ++j)
+            for (int k = 0; k < CELLS; ++k) {
+                const double x = a * ((j + 0.5) / CELLS - 0.5), y = b * ((k + 0.5) / CELLS - 0.5);
+                const double square = x * x + y * y + h * h;
+                form += h * h / (square * square) * a * b / (CELLS * CELLS);
+            }
+        assert_close(plate_under(&lamp, NULL, origin), 10.0 / (4.0 * a * b) * form / PI, 0.02);
+    }
+}
+
+/* Under an even world an open plate has the world's radiance times its albedo. */
+static void world_on_plate(void **state)
+{
+    (void)state;
+    const brume_world world = {.color = {3, 0.7f, 3}};
+    assert_close(plate_under(NULL, &world, origin), 0.7, 0.02);
+}
+
+/* --- In a medium -------------------------------------------------------------------------- */
+
+struct airlight {
+    const char *what;
+    float lamp[3];
+    float y, z; /* the ray runs along +X through (0, y, z) */
+    struct coefficients medium;
+    float spot_angle; /* 0: a point */
+};
+
+/* The medium is the cube of side 2 around the origin: how far towards the lamp it reaches. */
+static double inside(const double p[3], const double to_lamp[3], double distance)
+{
+    double length = distance;
+    for (int i = 0; i < 3; ++i)
+        if (fabs(to_lamp[i]) > 1e-12)
+            length = fmin(length, ((to_lamp[i] > 0 ? 1.0 : -1.0) - p[i]) / to_lamp[i]);
+    return length;
+}
+
+static double quadrature(const struct airlight *a, int channel)
+{
+    enum { STEPS = 20000 };
+    const double sigma_s = a->medium.sigma_s[channel], g = a->medium.g;
+    const double sigma_t = sigma_s + a->medium.sigma_a[channel];
+    double sum = 0.0;
+    for (int k = 0; k < STEPS; ++k) {
+        const double p[3] = {-1.0 + 2.0 * (k + 0.5) / STEPS, a->y, a->z};
+        double v[3], square = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            v[i] = a->lamp[i] - p[i];
+            square += v[i] * v[i];
+        }
+        const double distance = sqrt(square);
+        for (int i = 0; i < 3; ++i)
+            v[i] /= distance;
+        double intensity = 1.0 / (4.0 * PI);
+        if (a->spot_angle > 0.0f) /* it shines down, with Cycles' cosine */
+            intensity *= v[2] > cos(0.5 * a->spot_angle) ? v[2] : 0.0;
+        const double cosine = v[0]; /* the light goes along -v, the eye's way is -X */
+        const double phase =
+            (1.0 - g * g) / (4.0 * PI * pow(1.0 + g * g - 2.0 * g * cosine, 1.5));
+        sum += sigma_s * phase * intensity / square *
+               exp(-sigma_t * (inside(p, v, distance) + p[0] + 1.0)) * 2.0 / STEPS;
+    }
+    return sum;
+}
+
+static void airlight_of_lamps(void **state)
+{
+    (void)state;
+#define THIN {.sigma_s = {0.05f, 0.05f, 0.05f}}
+#define TINTED {.sigma_s = {0.05f, 0.5f, 1.0f}, .sigma_a = {0.2f, 0.1f, 0}, .g = 0.5f}
+    static const struct airlight cases[] = {
+        {"far from the ray, on a node", {0, 0, 0}, 0.5f, 0, THIN, 0},
+        {"near the ray, on a node", {0, 0, 0}, 0.1f, 0, THIN, 0},
+        {"very near the ray, on a node", {0, 0, 0}, 0.02f, 0, THIN, 0},
+        {"on a cell's face", {0.03125f, 0, 0.03125f}, 0.02f, 0, THIN, 0},
+        {"anywhere", {0.37f, -0.211f, 0.123f}, -0.2f, 0.1f, THIN, 0},
+        {"in a tinted medium", {0.1f, 0, 0}, 0.3f, 0.2f, TINTED, 0},
+        {"outside", {0, 0, 3}, 0.2f, 0, TINTED, 0},
+        {"in the ray's end, outside", {3, 0, 0.5f}, 0, 0, TINTED, 0},
+        {"a spot", {0, 0, 0.5f}, 0.1f, -0.5f, TINTED, 1.0f},
+        {"a wide spot", {0.2f, 0, 0.25f}, 0, -0.25f, THIN, 2.6f},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        const struct airlight *a = &cases[i];
+        brume_scene *scene;
+        assert_ok(brume_scene_create(device, &scene));
+        add_fog_cube(scene, 1, origin, 1.0f, &a->medium);
+        brume_light lamp = point_lamp(a->lamp, 1.0f);
+        if (a->spot_angle > 0.0f) {
+            lamp.type = BRUME_LIGHT_SPOT;
+            lamp.spot_angle = a->spot_angle;
+        }
+        assert_ok(brume_scene_set_light(scene, 1, &lamp));
+        brume_view view = orthographic_view((float[3]){0, a->y, a->z}, (float[3]){1, 0, 0}, 1e-4f,
+                                            3.0f, 8);
+        view.samples = 32;
+        view.passes = 1u << BRUME_PASS_VOLUME_DIRECT;
+        brume_job *job = render(scene, &settings, &view);
+        float *pixels = read_pass(job, &view, BRUME_PASS_VOLUME_DIRECT);
+        for (int channel = 0; channel < 3; ++channel) {
+            const double expected = quadrature(a, channel);
+            double mean = 0.0, most = 0.0;
+            for (int pixel = 0; pixel < 64; ++pixel) {
+                mean += pixels[3 * pixel + channel] / 64.0;
+                most = fmax(most, pixels[3 * pixel + channel]);
+            }
+            if (fabs(mean - expected) > 0.02 * expected)
+                fail_msg("lamp %s: %.6g instead of %.6g, %.2f %% off", a->what, mean, expected,
+                         100.0 * (mean / expected - 1.0));
+            /* All pixels see the same; none may be a firefly. */
+            if (most > 1.25 * expected)
+                fail_msg("lamp %s: a pixel of %.6g where %.6g is due", a->what, most, expected);
+        }
+        free(pixels);
+        brume_job_release(job);
+        brume_scene_destroy(scene);
+    }
+}
+
+/* The factors by kind of receiver, as Blender's light settings have them. */
+static void volume_factor(void **state)
+{
+    (void)state;
+    static const struct coefficients medium = THIN;
+    double values[3];
+    for (int i = 0; i < 3; ++i) {
+        brume_scene *scene;
+        brume_light lamp = point_lamp((float[3]){0, 0, 2}, 1.0f);
+        lamp.volume_factor = 0.5f * (float)i;
+        lamp.diffuse_factor = lamp.specular_factor = 0.0f;
+        assert_ok(brume_scene_create(device, &scene));
+        add_fog_cube(scene, 1, origin, 1.0f, &medium);
+        assert_ok(brume_scene_set_light(scene, 1, &lamp));
+        const brume_view view = orthographic_view(origin, (float[3]){1, 0, 0}, 0.1f, 3.0f, 4);
+        brume_job *job = render(scene, &settings, &view);
+        float *pixels = read_pass(job, &view, BRUME_PASS_COMBINED);
+        values[i] = middle(pixels, &view, 4, 0);
+        free(pixels);
+        brume_job_release(job);
+        brume_scene_destroy(scene);
+    }
+    assert_true(values[0] == 0.0 && values[2] > 0.0);
+    assert_close(values[1], 0.5 * values[2], 1e-5);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sun_on_plate),   cmocka_unit_test(point_on_plate),
+        cmocka_unit_test(spot_on_plate),  cmocka_unit_test(area_on_plate),
+        cmocka_unit_test(world_on_plate), cmocka_unit_test(airlight_of_lamps),
+        cmocka_unit_test(volume_factor),
+    };
+    return cmocka_run_group_tests(tests, open_device, close_device);
+}

@@ -27,6 +27,7 @@ class Case:
     change: str = ''        # a function of changes.py that sets scene or camera up
     # (name, pass index, tolerance): objects that are measured by themselves
     groups: tuple = ()
+    world_samples: int = 0  # Brume's; 0: the default
     passes: tuple = ()      # beyond Combined: of "Depth", "Normal", "Emit", "Env"
 
     @property
@@ -72,7 +73,8 @@ CASES = {case.name: case for case in (
     Case('surfaces', (), 0.03, 256, change='percentage'),
     Case('cube', (), 0.04, 512, change='inside'),
     Case('cube', (), 0.04, 512, change='fog_on_film'),
-    Case('lamps', (), 0.03, 1024, zoom=1.3, change='sky_alone'),
+    # With the default of 32 directions the sky's shadows have steps: 0.055.
+    Case('lamps', (), 0.03, 1024, zoom=1.3, change='sky_alone', world_samples=128),
     Case('lamps', (), 0.02, 512, change='lamps_seen'),
     Case('environment', (), 0.04, 1024, groups=ROUND),
     Case('environment', (), 0.04, 1024, change='hdr', groups=ROUND),

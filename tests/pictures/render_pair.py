@@ -97,6 +97,8 @@ def main(arguments):
             set_up_cycles(scene, case, options.seed)
         elif options.engine == 'BRUME':
             scene.brume.samples = case.samples
+            if case.world_samples:
+                scene.brume.world_samples = case.world_samples
         passes = render(scene, options.engine, os.path.join(options.out, name + '.exr'))
         np.savez(os.path.join(options.out, name + '.npz'), **passes)
 

@@ -46,7 +46,8 @@ write('environment.hdr', sky(), 'HDR')
 grey = staging.matt('Grey', (0.5, 0.5, 0.5))
 staging.add('Floor', bpy.ops.mesh.primitive_circle_add, grey, vertices=64, radius=2.6,
             fill_type='NGON').pass_index = 1
-staging.sphere('Ball', 0.5, (-0.95, 0.2, 0.5), staging.matt('White', (0.8, 0.8, 0.8))).pass_index = 1
+white = staging.matt('White', (0.8, 0.8, 0.8))
+staging.sphere('Ball', 0.5, (-0.95, 0.2, 0.5), white).pass_index = 1
 metal = bpy.data.materials.new('Metal')
 metal.use_nodes = True
 shader = metal.node_tree.nodes['Principled BSDF']

@@ -182,7 +182,8 @@ glow.visible_diffuse = glow.visible_glossy = glow.visible_volume_scatter = False
 ball = staging.add('Facets', bpy.ops.mesh.primitive_ico_sphere_add, clay, subdivisions=2,
                    radius=0.35, location=(-2.3, 0.9, 0.35))
 place(ball, MATT)
-block = place(staging.box('Slots', (0.55, 0.55, 0.55), (-1.5, 1.0, 0.275), clay, rotation=0.7), MATT)
+block = place(staging.box('Slots', (0.55, 0.55, 0.55), (-1.5, 1.0, 0.275), clay, rotation=0.7),
+              MATT)
 for material in (blue, grey):
     block.data.materials.append(material)
 for number, polygon in enumerate(block.data.polygons):

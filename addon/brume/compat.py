@@ -84,6 +84,11 @@ def light_casts_shadow(light):
     return light.use_shadow and getattr(getattr(light, "cycles", None), "cast_shadow", True)
 
 
+def light_is_seen(light):
+    """Cycles shows a lamp to the camera only where it samples it from both sides."""
+    return getattr(getattr(light, "cycles", None), "use_multiple_importance_sampling", True)
+
+
 def light_is_portal(light):
     return bool(getattr(getattr(light, "cycles", None), "is_portal", False))
 

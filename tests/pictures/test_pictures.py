@@ -57,7 +57,8 @@ def test_against_cycles(name, reference):
     assert total < case.tolerance
     assert not failed
     if expected['Combined'].shape[-1] == 4:
-        apart, _ = compare.difference(brume(name)['Combined'][..., 3:], expected['Combined'][..., 3:])
+        covers = (passes['Combined'][..., 3:] for passes in (brume(name), expected))
+        apart, _ = compare.difference(*covers)
         assert apart < 0.01, f'alpha is off by {apart:.4f}'
 
 

@@ -59,4 +59,4 @@ def export(target, ob, matrix, persistent_id=(), camera_visible=True):
     target.put("light", key_of_datablock(ob, *persistent_id), name=ob.name,
                world_from_light=matrix, power=tuple(power.tolist()),
                cast_shadow=bool(compat.light_casts_shadow(light)),
-               camera_visible=bool(camera_visible), **_shape(light))
+               camera_visible=bool(camera_visible and compat.light_is_seen(light)), **_shape(light))

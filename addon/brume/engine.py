@@ -117,7 +117,8 @@ class BrumeEngine(bpy.types.RenderEngine):
             if now - shown > STATUS_INTERVAL:
                 shown = now
                 name = native.library().stage_name(status.stage).decode()
-                self.update_stats("", f"Brume | {name} | Sample {status.samples_done}/{view.samples}")
+                self.update_stats("", f"Brume | {name} | "
+                                      f"Sample {status.samples_done}/{view.samples}")
             # The first picture is there once the second sample has begun.
             if (view.progressive and status.samples_done > 1
                     and now - pictured > PICTURE_INTERVAL):

@@ -110,7 +110,8 @@ class BrumeViewLayerSettings(bpy.types.PropertyGroup):
         description="Light that volumes scattered straight from lights and world to the camera")
     use_pass_transmittance: BoolProperty(
         name="Transmittance", default=False,
-        description="Share of light that the volumes in front of the first surface let through, by colour")
+        description="Share of the light that the volumes in front of the first surface let "
+                    "through, by colour")
 
 
 # Pass of brume.h, Blender's name and channels, type for register_pass, and where its switch is.

@@ -418,7 +418,7 @@ typedef struct brume_settings {
     int32_t iterations;              /* 0: until converged */
     int32_t shadow_resolution;       /* texels of a shadow map's side; 0: 512 */
     int32_t light_samples;           /* shadow maps spread over each lamp; 0: 8 */
-    int32_t world_samples;           /* directions that stand for the world's light; 0: 32 */
+    int32_t world_samples;           /* directions that stand for the world's light; 0: 128 */
     float step;                      /* march step in cells of the medium; 0: 1 */
     uint64_t memory_budget;          /* bytes on the GPU; 0: 2 GiB */
 } brume_settings;

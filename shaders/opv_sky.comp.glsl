@@ -14,6 +14,8 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D sky_image[3];
 
+const uint SKY_SAMPLES = 64u;
+
 void main()
 {
     ivec3 node = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
@@ -22,16 +24,20 @@ void main()
     vec3 p = frame.sky_lower.xyz + vec3(node) * frame.sky_lower.w;
     float step_length = 2.0 * frame.medium_lower.w;
     vec4 red = vec4(0.0), green = vec4(0.0), blue = vec4(0.0);
-    for (uint i = 0u; i < frame.world.y; ++i) {
+    // Of many samples a node takes every so-manieth, which are spread as evenly as all are; which,
+    // differs from node to node.
+    uint every = max(frame.world.y / SKY_SAMPLES, 1u);
+    uint start = hash(uint(node.x) + hash(uint(node.y) + hash(uint(node.z)))) % every;
+    for (uint i = start; i < frame.world.y; i += every) {
         gpu_light_sample s = light_samples[frame.world.x + i];
         vec3 towards = s.position.xyz;
-        int layer = int(s.position.w);
-        if (layer >= 0 && distant_shadow_medium(layer, frame.world.w, p) == 0.0)
+        int number = int(s.position.w);
+        if (number >= 0 && distant_shadow_medium(number, frame.world.w, p) == 0.0)
             continue;
         vec3 tau = fog_tau(p, towards, 1e30);
         if (medium_exists())
             tau += medium_tau(p, towards, 1e30, step_length, 0.5);
-        vec3 light = s.weight.rgb * exp(-tau);
+        vec3 light = s.weight.rgb * exp(-tau) * float(every);
         // Y_0 = sqrt(1 / 4 pi), Y_1 = sqrt(3 / 4 pi) (y, z, x); kept as mean and flux vector:
         // the constants are put back in sky_scatter().
         vec4 basis = vec4(1.0, -towards);

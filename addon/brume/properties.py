@@ -13,11 +13,11 @@ METHODS = [
 
 PRESETS = {
     'DRAFT': {"samples": 4, "medium_resolution": 64, "lattice_resolution": 32, "step": 4.0,
-              "shadow_resolution": 256, "light_samples": 4, "world_samples": 16},
+              "shadow_resolution": 256, "light_samples": 4, "world_samples": 32},
     'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64, "step": 3.0,
-                "shadow_resolution": 512, "light_samples": 8, "world_samples": 32},
+                "shadow_resolution": 512, "light_samples": 8, "world_samples": 128},
     'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96, "step": 1.0,
-              "shadow_resolution": 1024, "light_samples": 16, "world_samples": 64},
+              "shadow_resolution": 1024, "light_samples": 16, "world_samples": 256},
 }
 _DEFAULT = PRESETS['PREVIEW']
 
@@ -55,7 +55,7 @@ class BrumeSettings(bpy.types.PropertyGroup):
                     "time to fill it grow with the third power")
     lattice_resolution: IntProperty(
         name="Light Resolution", default=_DEFAULT["lattice_resolution"], min=4, max=512,
-        soft_max=128,
+        soft_max=512,
         description="Cells along the longest side of the lattice in which light travels. More "
                     "give sharper shadows of smoke on smoke; memory and time grow with the third "
                     "power, and with the number of lights")
@@ -73,9 +73,10 @@ class BrumeSettings(bpy.types.PropertyGroup):
         description="Shadow maps spread over each light. More give smoother soft shadows; time "
                     "and memory grow in proportion")
     world_samples: IntProperty(
-        name="World Samples", default=_DEFAULT["world_samples"], min=1, max=1024, soft_max=128,
-        description="Directions that stand for the world's light. More catch smaller bright "
-                    "spots of an environment texture; time and memory grow in proportion")
+        name="World Samples", default=_DEFAULT["world_samples"], min=1, max=1024, soft_max=512,
+        description="Directions that stand for the world's light, each with a small shadow map. More "
+                    "soften its shadows and catch smaller bright spots of an environment "
+                    "texture; time and memory grow in proportion")
     step: FloatProperty(
         name="Step", default=_DEFAULT["step"], min=0.05, max=16.0, soft_max=4.0, precision=2,
         description="Length of a step through volumes, in cells of their lattice. Each sample "

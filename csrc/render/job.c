@@ -24,7 +24,7 @@ static brume_result check_settings(brume_settings *settings)
     set_default(&settings->lattice_resolution, 64);
     set_default(&settings->shadow_resolution, 512);
     set_default(&settings->light_samples, 8);
-    set_default(&settings->world_samples, 32);
+    set_default(&settings->world_samples, 128);
     if (settings->step == 0.0f)
         settings->step = 1.0f;
     if (settings->memory_budget == 0)

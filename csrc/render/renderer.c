@@ -13,6 +13,7 @@
 
 /* Steps of a ray through the world's medium where there is no lattice. */
 #define FOG_STEPS 24
+#define WORLD_SAMPLES_A_PIXEL 64u
 /* Between two pictures of a progressive job. */
 #define PICTURE_MS 500.0
 
@@ -127,7 +128,9 @@ static void set_world(struct run *run)
         mat4_identity(frame->image_from_world.m);
     const uint32_t count = renderer->shadows.world_count;
     const uint32_t samples = run->request->view.samples;
-    frame->world = (uvec4){renderer->shadows.world_first, count, (count + samples - 1) / samples,
+    /* A pixel need not see all of many directions: its neighbours see the others. */
+    const uint32_t seen = count < WORLD_SAMPLES_A_PIXEL ? count : WORLD_SAMPLES_A_PIXEL;
+    frame->world = (uvec4){renderer->shadows.world_first, count, (seen + samples - 1) / samples,
                            renderer->shadows.world_faces};
     frame->counts = (uvec4){renderer->shadows.light_count, (uint32_t)renderer->shadows.side, 0, 0};
     glBindTextureUnit(SLOT_WORLD, image ? image->texture.id : 0);

@@ -15,6 +15,7 @@
 #define COARSE_SIDE 128   /* texels: below this, fewer samples hurt less than coarser maps */
 #define LEAST_SIDE 16
 #define FEW_DIRECTIONS 16 /* of the world */
+#define WORLD_TILES 4     /* maps of the world in one layer */
 
 static float radius_of(const struct geometry *geometry, float center[3])
 {
@@ -124,10 +125,16 @@ static uint32_t faces_of(const brume_light *light, uint32_t distant)
     return light->type == BRUME_LIGHT_SUN ? distant : light_faces(light);
 }
 
-static uint64_t layer_count(const struct snapshot *snapshot, const struct shadow_plan *plan)
+/* The world is many soft directions: how many they are matters more than how sharp each is. */
+static uint32_t world_layer_count(const struct shadow_plan *plan)
+{
+    return (plan->world_samples * plan->distant + WORLD_TILES - 1) / WORLD_TILES;
+}
+
+static uint64_t lamp_layer_count(const struct snapshot *snapshot, const struct shadow_plan *plan)
 {
     const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
-    uint64_t layers = (uint64_t)plan->world_samples * plan->distant;
+    uint64_t layers = 0;
     for (uint32_t i = 0; i < table->count; ++i) {
         const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
         if (light->cast_shadow)
@@ -138,22 +145,23 @@ static uint64_t layer_count(const struct snapshot *snapshot, const struct shadow
 }
 
 static brume_result allocate(struct shadows *shadows, const struct snapshot *snapshot,
-                             uint32_t light_samples, uint32_t world, uint32_t layers)
+                             const struct shadow_plan *plan)
 {
     const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
-    uint32_t samples = world;
+    const uint32_t views = plan->lamp_layers + plan->world_samples * plan->distant;
+    uint32_t samples = plan->world_samples;
     for (uint32_t i = 0; i < table->count; ++i)
         samples += light_sample_count(&((struct light_block *)table->entries[i].block)->light,
-                                      light_samples);
+                                      plan->light_samples);
     free(shadows->lights);
     free(shadows->samples);
     free(shadows->views);
     shadows->lights = calloc((size_t)table->count + 1, sizeof *shadows->lights);
     shadows->samples = calloc((size_t)samples + 1, sizeof *shadows->samples);
-    shadows->views = calloc((size_t)layers + 1, sizeof *shadows->views);
+    shadows->views = calloc((size_t)views + 1, sizeof *shadows->views);
     shadows->light_count = table->count;
     shadows->sample_count = samples;
-    shadows->view_count = layers;
+    shadows->view_count = 0;
     if (!shadows->lights || !shadows->samples || !shadows->views)
         return fail(BRUME_E_MEMORY, "no memory for %u lights", table->count);
     return BRUME_OK;
@@ -180,7 +188,7 @@ brume_result shadows_plan(const struct snapshot *snapshot, const brume_settings 
                           struct shadow_plan *plan)
 {
     *plan = (struct shadow_plan){
-        .side = settings->shadow_resolution,
+        .side = settings->shadow_resolution / 2 * 2, /* quarters of whole texels */
         .light_samples = (uint32_t)settings->light_samples,
         .distant = casts(geometry) ? distant_faces(geometry) : 1,
     };
@@ -188,13 +196,16 @@ brume_result shadows_plan(const struct snapshot *snapshot, const brume_settings 
         plan->world_samples = (uint32_t)settings->world_samples;
     for (;;) {
         const int fewest = plan->light_samples == 1 && plan->world_samples <= FEW_DIRECTIONS;
-        uint64_t layers = casts(geometry) ? layer_count(snapshot, plan) : 0;
-        if (fewest && layers > MAX_LAYERS)
-            layers = MAX_LAYERS; /* the last lamps get none */
+        const uint32_t world = casts(geometry) ? world_layer_count(plan) : 0;
+        uint64_t lamps = casts(geometry) ? lamp_layer_count(snapshot, plan) : 0;
+        if (fewest && lamps + world > MAX_LAYERS)
+            lamps = MAX_LAYERS - world; /* the last lamps get none */
+        const uint64_t layers = lamps + world;
         const uint64_t texels = (uint64_t)plan->side * (uint64_t)plan->side;
         const int too_many = layers > MAX_LAYERS;
-        plan->layers = (uint32_t)layers;
-        if (!too_many && layers * (texels * 4 + sizeof(struct gpu_shadow_view)) <= budget)
+        plan->lamp_layers = (uint32_t)lamps;
+        plan->world_layers = world;
+        if (!too_many && layers * (texels * 4 + WORLD_TILES * sizeof(struct gpu_shadow_view)) <= budget)
             return BRUME_OK;
         /* Sharpness goes before softness, as far as it is plenty. */
         if (!too_many && plan->side > (fewest ? LEAST_SIDE : COARSE_SIDE)) {
@@ -225,17 +236,17 @@ brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
         job_warn(control, "LIGHT_SAMPLES_FEWER",
                  "%u shadow maps a lamp instead of %d, and %u for the world: no more fit", wanted,
                  settings->light_samples, world_count);
-    if (side < settings->shadow_resolution)
+    if (side < settings->shadow_resolution - 1)
         job_warn(control, "SHADOWS_COARSER",
                  "shadow maps of %d instead of %d texels, to keep the memory budget", side,
                  settings->shadow_resolution);
-    TRY(allocate(shadows, snapshot, wanted, world_count, plan->layers));
+    TRY(allocate(shadows, snapshot, plan));
     shadows->side = side;
+    shadows->layer_count = plan->lamp_layers + plan->world_layers;
     shadows->world_faces = distant;
 
     const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
-    const uint32_t lamp_layers = casters ? plan->layers - world_count * distant : 0;
-    uint32_t next_sample = 0, next_layer = 0, left_out = 0;
+    uint32_t next_sample = 0, next_view = 0, left_out = 0;
     for (uint32_t i = 0; i < table->count; ++i) {
         const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
         struct gpu_light *out = &shadows->lights[i];
@@ -252,17 +263,18 @@ brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
             light_sample(light, out, s, count, sample);
             if (!light->cast_shadow || !casters)
                 continue;
-            if (next_layer + faces > lamp_layers) {
+            if (next_view + faces > plan->lamp_layers) {
                 ++left_out;
                 continue;
             }
-            sample->position.w = (float)next_layer;
+            sample->position.w = (float)next_view;
             if (light->type == BRUME_LIGHT_SUN)
                 distant_views(geometry, faces, &sample->position, side,
-                              &shadows->views[next_layer]);
+                              &shadows->views[next_view]);
             else
-                lamp_views(light, out, sample, geometry, side, &shadows->views[next_layer]);
-            next_layer += faces;
+                lamp_views(light, out, sample, geometry, side, &shadows->views[next_view]);
+            for (uint32_t face = 0; face < faces; ++face, ++next_view)
+                shadows->views[next_view].tile = (vec4){0.0f, 0.0f, 1.0f, (float)next_view};
         }
     }
     if (left_out)
@@ -280,12 +292,18 @@ brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
                           world_from_image, world_count, shadows->samples + next_sample));
         for (uint32_t s = 0; s < world_count && casters; ++s) {
             struct gpu_light_sample *sample = &shadows->samples[next_sample + s];
-            sample->position.w = (float)next_layer;
-            distant_views(geometry, distant, &sample->position, side, &shadows->views[next_layer]);
-            next_layer += distant;
+            sample->position.w = (float)next_view;
+            distant_views(geometry, distant, &sample->position, side / 2,
+                          &shadows->views[next_view]);
+            for (uint32_t face = 0; face < distant; ++face, ++next_view) {
+                const uint32_t tile = s * distant + face;
+                shadows->views[next_view].tile =
+                    (vec4){tile & 1 ? 0.5f : 0.0f, tile & 2 ? 0.5f : 0.0f, 0.5f,
+                           (float)(plan->lamp_layers + tile / WORLD_TILES)};
+            }
         }
     }
-    shadows->view_count = next_layer;
+    shadows->view_count = next_view;
     return BRUME_OK;
 }
 
@@ -301,7 +319,7 @@ brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows)
                       shadows->view_count * sizeof *shadows->views, shadows->views,
                       "shadow views"));
     /* A sampler wants a texture, even where nothing casts a shadow. */
-    const int layers = shadows->view_count ? (int)shadows->view_count : 1;
+    const int layers = shadows->view_count ? (int)shadows->layer_count : 1;
     const int side = shadows->view_count ? shadows->side : 1;
     return texture_ensure(memory, &shadows->maps, FOR_SHADOW, GL_TEXTURE_2D_ARRAY,
                           GL_DEPTH_COMPONENT32F, side, side, layers, 1, "shadow maps");
@@ -318,14 +336,18 @@ brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geo
     glTextureParameteri(shadows->maps.id, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     glTextureParameteri(shadows->maps.id, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     glBindFramebuffer(GL_FRAMEBUFFER, shadows->framebuffer);
-    glViewport(0, 0, shadows->side, shadows->side);
     for (uint32_t i = 0; i < shadows->view_count; ++i) {
         if (job_cancelled(control))
             return fail(BRUME_E_CANCELLED, "cancelled");
-        glNamedFramebufferTextureLayer(shadows->framebuffer, GL_DEPTH_ATTACHMENT, shadows->maps.id,
-                                       0, (GLint)i);
+        const vec4 tile = shadows->views[i].tile;
+        const float side = (float)shadows->side;
         static const float far_ = 0.0f;
-        glClearNamedFramebufferfv(shadows->framebuffer, GL_DEPTH, 0, &far_);
+        glNamedFramebufferTextureLayer(shadows->framebuffer, GL_DEPTH_ATTACHMENT, shadows->maps.id,
+                                       0, (GLint)tile.w);
+        if (tile.x == 0.0f && tile.y == 0.0f) /* the first of its layer */
+            glClearNamedFramebufferfv(shadows->framebuffer, GL_DEPTH, 0, &far_);
+        glViewport((GLint)(tile.x * side), (GLint)(tile.y * side), (GLsizei)(tile.z * side),
+                   (GLsizei)(tile.z * side));
         const struct gpu_draw stage = {.clip_from_world = shadows->views[i].clip_from_world,
                                        .info = {i, 0, 0, 0}};
         TRY(geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_SHADOW, 1));

@@ -13,7 +13,8 @@ struct shadows {
     uint32_t light_count, sample_count, view_count;
     uint32_t world_first, world_count; /* samples */
     uint32_t world_faces;              /* maps a sample of the world */
-    int side;                          /* texels */
+    int side;                          /* texels of a lamp's map; the world's have half */
+    uint32_t layer_count;
     struct buffer light_buffer, sample_buffer, view_buffer;
     struct texture maps;
     GLuint framebuffer;
@@ -24,7 +25,7 @@ struct shadow_plan {
     int side;
     uint32_t light_samples, world_samples;
     uint32_t distant; /* maps of a distant light */
-    uint32_t layers;
+    uint32_t lamp_layers, world_layers; /* a layer holds one map of a lamp, or four of the world */
 };
 
 /* budget: bytes that the maps may take. Arithmetic alone. */

@@ -21,7 +21,7 @@ const float SHADOW_OUTSIDE = -1.0;
 
 // The share of a light sample that geometry lets through to p: one texel (soft false) or a
 // bilinear comparison of four. SHADOW_OUTSIDE where the map does not reach.
-float shadow_test(gpu_shadow_view view, int layer, vec3 p, float bias, bool soft)
+float shadow_test(gpu_shadow_view view, vec3 p, float bias, bool soft)
 {
     vec4 clip = view.clip_from_world * vec4(p, 1.0);
     if (clip.w <= 0.0)
@@ -34,27 +34,32 @@ float shadow_test(gpu_shadow_view view, int layer, vec3 p, float bias, bool soft
                               : clip.w;
     distance_here -= bias;
     float side = float(frame.counts.y);
+    vec2 texel = (view.tile.xy + uv * view.tile.z) * side;
+    // Whole texels of this map, and none of the one beside it in the layer.
+    vec2 low = view.tile.xy * side, high = low + view.tile.z * side;
     if (!soft) {
-        ivec2 texel = min(ivec2(uv * side), ivec2(side) - 1);
-        float depth = texelFetch(shadow_maps, ivec3(texel, layer), 0).r;
+        texel = clamp(texel, low + 0.5, high - 0.5);
+        float depth = texelFetch(shadow_maps, ivec3(texel, int(view.tile.w)), 0).r;
         return shadow_distance(view, depth) < distance_here ? 0.0 : 1.0;
     }
-    vec4 depths = textureGather(shadow_maps, vec3(uv, float(layer)));
+    texel = clamp(texel, low + 1.0, high - 1.0);
+    vec4 depths = textureGather(shadow_maps, vec3(texel / side, view.tile.w));
     vec4 lit;
     for (int i = 0; i < 4; ++i)
         lit[i] = shadow_distance(view, depths[i]) < distance_here ? 0.0 : 1.0;
-    vec2 f = fract(uv * side - 0.5);
+    vec2 f = fract(texel - 0.5);
     return mix(mix(lit.w, lit.z, f.x), mix(lit.x, lit.y, f.x), f.y);
 }
 
 // A point of a medium has no normal to step off along: near a surface it stays clear of the depths
 // that a texel of the map rounds.
-float shadow_medium(gpu_shadow_view view, int layer, vec3 p, float distance)
+float shadow_medium(int number, vec3 p, float distance)
 {
-    return shadow_test(view, layer, p, 1.5 * view.range.w * distance, false);
+    gpu_shadow_view view = shadow_views[number];
+    return shadow_test(view, p, 1.5 * view.range.w * distance, false);
 }
 
-// The layer that sees along v (from the light), by the light's faces.
+// The view that sees along v (from the light), by the light's faces.
 int shadow_face(gpu_light light, vec3 v)
 {
     if (light.samples.z == 1u)
@@ -77,34 +82,34 @@ int shadow_face(gpu_light light, vec3 v)
 
 // A surface moves the look-up off itself along its normal by the texel's size. The slope's share of
 // the bias is bounded: at grazing light the offset along the normal does the rest.
-float shadow_surface(int layer, vec3 p, float distance, vec3 normal, vec3 towards)
+float shadow_surface(int number, vec3 p, float distance, vec3 normal, vec3 towards)
 {
-    gpu_shadow_view view = shadow_views[layer];
+    gpu_shadow_view view = shadow_views[number];
     float texel = view.range.w * distance;
     float cosine = clamp(dot(normal, towards), 0.05, 1.0);
     float slope = min(sqrt(1.0 - cosine * cosine) / cosine, 4.0);
-    return shadow_test(view, layer, p + normal * texel, texel * (0.5 + 0.5 * slope), true);
+    return shadow_test(view, p + normal * texel, texel * (0.5 + 0.5 * slope), true);
 }
 
 // Distant lights have one map, or a fine one before a wide one.
-float distant_shadow(int layer, uint maps, vec3 p, vec3 normal, vec3 towards)
+float distant_shadow(int number, uint maps, vec3 p, vec3 normal, vec3 towards)
 {
-    float lit = shadow_surface(layer, p, 1.0, normal, towards);
+    float lit = shadow_surface(number, p, 1.0, normal, towards);
     if (lit == SHADOW_OUTSIDE && maps == 2u)
-        lit = shadow_surface(layer + 1, p, 1.0, normal, towards);
+        lit = shadow_surface(number + 1, p, 1.0, normal, towards);
     return abs(lit); // beyond all geometry: lit
 }
 
-float distant_shadow_medium(int layer, uint maps, vec3 p)
+float distant_shadow_medium(int number, uint maps, vec3 p)
 {
-    float lit = shadow_medium(shadow_views[layer], layer, p, 1.0);
+    float lit = shadow_medium(number, p, 1.0);
     if (lit == SHADOW_OUTSIDE && maps == 2u)
-        lit = shadow_medium(shadow_views[layer + 1], layer + 1, p, 1.0);
+        lit = shadow_medium(number + 1, p, 1.0);
     return abs(lit);
 }
 
-// The layer of a lamp's sample that sees p, -1 where nothing can stand between.
-int lamp_layer(gpu_light light, gpu_light_sample s, vec3 p)
+// The view of a lamp's sample that sees p, -1 where nothing can stand between.
+int lamp_view(gpu_light light, gpu_light_sample s, vec3 p)
 {
     int face = shadow_face(light, p - s.position.xyz);
     // No map looks behind an area light, which sends nothing there.
@@ -117,12 +122,12 @@ float light_shadow(gpu_light light, gpu_light_sample s, vec3 p, vec3 normal)
         return 1.0;
     if (light.info.x == uint(LIGHT_SUN))
         return distant_shadow(int(s.position.w), light.samples.z, p, normal, s.position.xyz);
-    int layer = lamp_layer(light, s, p);
-    if (layer < 0)
+    int number = lamp_view(light, s, p);
+    if (number < 0)
         return 1.0;
     vec3 v = s.position.xyz - p;
     float distance = length(v);
-    return abs(shadow_surface(layer, p, distance, normal, v / distance));
+    return abs(shadow_surface(number, p, distance, normal, v / distance));
 }
 
 float light_shadow_medium(gpu_light light, gpu_light_sample s, vec3 p, float distance)
@@ -131,6 +136,6 @@ float light_shadow_medium(gpu_light light, gpu_light_sample s, vec3 p, float dis
         return 1.0;
     if (light.info.x == uint(LIGHT_SUN))
         return distant_shadow_medium(int(s.position.w), light.samples.z, p);
-    int layer = lamp_layer(light, s, p);
-    return layer < 0 ? 1.0 : abs(shadow_medium(shadow_views[layer], layer, p, distance));
+    int number = lamp_view(light, s, p);
+    return number < 0 ? 1.0 : abs(shadow_medium(number, p, distance));
 }

@@ -78,16 +78,17 @@ struct gpu_light {
 
 struct gpu_light_sample {
     vec4 position;   /* point on the light; sun and world: unit vector towards it.
-                        w: first shadow layer, -1: none */
+                        w: first shadow view, -1: none */
     vec4 weight;     /* world: radiance times solid angle. area: middle and half size of the
                         stratum in [-1, 1]^2 */
 };
 
-/* One layer of the shadow maps. */
+/* One shadow map: a layer of their texture, or a quarter of one. */
 struct gpu_shadow_view {
     mat4 clip_from_world;
     vec4 range;      /* x: 0 perspective, 1 orthographic; y near; z far; w: texel's size, m at
                         distance 1 (perspective) or anywhere (orthographic) */
+    vec4 tile;       /* x, y: lower corner in the layer, 0..1; z: side, 0..1; w: layer */
 };
 
 #define MATERIAL_BASE_IMAGE 1u

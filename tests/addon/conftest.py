@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the add-on's tests share: an empty scene, node trees in few words, a recording scene."""
 
+import math
+import os
+import subprocess
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
+from brume import native
 from brume.export.target import Target
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 class Recorder:
@@ -144,3 +152,47 @@ def write_vdb(path, **grids):
         made.append(grid)
     vdb.write(str(path), grids=made)
     return str(path)
+
+
+# -- whole renders
+
+
+def lit(scene, density=2.0):
+    """A fog cube in the sun, seen from the front."""
+    fog, nodes = material("Fog")
+    nodes.volume(nodes.node("VolumeScatter", Color=(1, 1, 1, 1), Density=density))
+    cube("Fog", material=fog)
+    sun = bpy.data.lights.new("Sun", 'SUN')
+    sun.energy = 10.0
+    add("Sun", sun).rotation_euler = (0.6, 0.3, 0)
+    camera = bpy.data.cameras.new("Camera")
+    scene.camera = add("Camera", camera, location=(0, -6, 0))
+    scene.camera.rotation_euler = (math.pi / 2, 0, 0)
+    scene.render.film_transparent = True
+    return scene
+
+
+@pytest.fixture
+def render(tmp_path):
+    """Renders Blender's scene to a file; gives its pixels, rows from the bottom."""
+    def run(name="picture"):
+        path = tmp_path / f"{name}.exr"
+        bpy.context.scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True)
+        return native.exr_read(path)
+    return run
+
+
+def blender(*arguments, **environment):
+    return subprocess.run(
+        [ROOT / "scripts" / "blender", "-b", *arguments], capture_output=True, text=True,
+        timeout=300, env=os.environ | environment)
+
+
+@pytest.fixture
+def saved(scene, tmp_path):
+    lit(scene)
+    scene.render.engine = 'CYCLES'
+    path = tmp_path / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    return path

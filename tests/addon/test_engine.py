@@ -1,47 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whole renders inside Blender, with the real library, and Blender processes with broken ones."""
 
-import math
-import os
 import signal
 import subprocess
 import time
-from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 from brume import engine, native, properties, session
-from conftest import add, cube, material
+from conftest import ROOT, blender, cube, lit
 
-ROOT = Path(__file__).resolve().parents[2]
 SIZE = 24, 32  # rows, columns
-
-
-def lit(scene, density=2.0):
-    """A fog cube in the sun, seen from the front."""
-    fog, nodes = material("Fog")
-    nodes.volume(nodes.node("VolumeScatter", Color=(1, 1, 1, 1), Density=density))
-    cube("Fog", material=fog)
-    sun = bpy.data.lights.new("Sun", 'SUN')
-    sun.energy = 10.0
-    add("Sun", sun).rotation_euler = (0.6, 0.3, 0)
-    camera = bpy.data.cameras.new("Camera")
-    scene.camera = add("Camera", camera, location=(0, -6, 0))
-    scene.camera.rotation_euler = (math.pi / 2, 0, 0)
-    scene.render.film_transparent = True
-    return scene
-
-
-@pytest.fixture
-def render(tmp_path):
-    """Renders Blender's scene to a file; gives its pixels, rows from the bottom."""
-    def run(name="picture"):
-        path = tmp_path / f"{name}.exr"
-        bpy.context.scene.render.filepath = str(path)
-        bpy.ops.render.render(write_still=True)
-        return native.exr_read(path)
-    return run
 
 
 @pytest.fixture
@@ -99,18 +69,6 @@ def test_last_stats(scene, render):
     assert 0 < export_s < whole_s
     assert stats.total_ms / 1000 < whole_s
     assert stats.samples == scene.brume.samples
-
-
-def test_missing_vdb_leaves_the_rest(scene, render, reported):
-    lit(scene)
-    whole = render()
-    cloud = bpy.data.volumes.new("Cloud")
-    cloud.filepath = "/nowhere/none.vdb"
-    add("Cloud", cloud)
-    assert np.array_equal(render("b"), whole)
-    assert len(reported) == 1
-    assert "Cloud" in reported[0]
-    assert "none.vdb" in reported[0]
 
 
 def test_zero_scale_leaves_the_rest(scene, render, reported):
@@ -255,21 +213,6 @@ def test_panels_apply():
 # -- other processes
 
 
-def blender(*arguments, **environment):
-    return subprocess.run(
-        [ROOT / "scripts" / "blender", "-b", *arguments], capture_output=True, text=True,
-        timeout=300, env=os.environ | environment)
-
-
-@pytest.fixture
-def saved(scene, tmp_path):
-    lit(scene)
-    scene.render.engine = 'CYCLES'
-    path = tmp_path / "scene.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-    return path
-
-
 def test_engine_from_the_command_line(saved, tmp_path):
     done = blender(saved, "-E", "BRUME", "-o", tmp_path / "out_####", "-f", "1")
     assert done.returncode == 0, done.stderr
@@ -294,26 +237,6 @@ def test_cancel(saved, tmp_path):
     assert process.returncode in {0, 1}, "Blender crashed"
     assert "Saved" not in rest
     assert not (tmp_path / "out_0001.exr").exists()
-
-
-def test_missing_library(saved, tmp_path):
-    done = blender(saved, "-E", "BRUME", "-o", tmp_path / "out_####", "-f", "1",
-                   BRUME_LIBRARY=str(tmp_path / "no.so"))
-    assert "LIBRARY_MISSING" in done.stdout + done.stderr
-    assert "no.so" in done.stdout + done.stderr
-    assert done.returncode in {0, 1}, "Blender crashed"
-    assert not (tmp_path / "out_0001.exr").exists()
-
-
-def test_library_of_another_abi(saved, tmp_path):
-    source = tmp_path / "other.c"
-    source.write_text("unsigned brume_abi(void) { return 999; }"
-                      "unsigned long brume_struct_size(const char *n) { return 1; }")
-    subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "other.so", source], check=True)
-    done = blender(saved, "-E", "BRUME", "-o", tmp_path / "out_####", "-f", "1",
-                   BRUME_LIBRARY=str(tmp_path / "other.so"))
-    assert "LIBRARY_ABI" in done.stdout + done.stderr
-    assert done.returncode in {0, 1}, "Blender crashed"
 
 
 def test_add_on_goes_and_comes(scene):

@@ -474,3 +474,33 @@ def test_other_kinds_are_drawn_once(scene, export, kind):
     assert len(recorder.of("mesh")) == 1
     block, = recorder.of("instances")
     assert len(block["world_from_object"]) == 1
+
+
+@pytest.mark.parametrize("name", ["smoke_007.vdb", "12.vdb", "v2.smoke9.vdb", "smoke.vdb",
+                                  "smoke_3_.vdb", "00001.vdb"])
+def test_files_of_sequences(scene, tmp_path, name):
+    """Brume finds the file of a frame as Blender does."""
+    digits = len(name) - 4 - len(name[:-4].rstrip("0123456789"))
+    for frame in range(-3, 15):
+        number = f"{'-' if frame < 0 else ''}{abs(frame):0{digits}}" if digits else ""
+        write_vdb(tmp_path / f"{name[:-4 - digits]}{number}.vdb",
+                  density=np.ones((2, 2, 2), np.float32))
+    cloud = bpy.data.volumes.new("Cloud")
+    cloud.filepath = str(tmp_path / name)
+    ob = add("Cloud", cloud)
+    compared = set()
+    for is_sequence in (False, True):
+        for mode in ('CLIP', 'EXTEND', 'REPEAT', 'PING_PONG'):
+            for start, duration, offset in ((1, 5, 0), (3, 4, -2), (-2, 6, 7), (1, 0, 0)):
+                cloud.is_sequence, cloud.sequence_mode = is_sequence, mode
+                cloud.frame_start, cloud.frame_duration = start, duration
+                cloud.frame_offset = offset
+                for frame in (-4, 0, 1, 2, 5, 6, 9):
+                    scene.frame_set(frame)
+                    found = ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+                    path = volume.frame_path(found)
+                    found.grids.load()
+                    assert (path or "") == found.grids.frame_filepath
+                    compared.add(path)
+    if digits:
+        assert len(compared) > 5

@@ -3,6 +3,7 @@
 
 import hashlib
 import os
+import re
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,10 @@ from .volume_shader import compile_volume, default_program
 def density_scale(matrix):
     """What Cycles multiplies the coefficients of a medium in object space by (object.cpp,
     object_volume_density): a stretched volume keeps its optical depth."""
-    return 1.0 / np.linalg.norm(np.asarray(matrix)[:3, :3] @ np.full(3, 3 ** -0.5))
+    length = np.linalg.norm(np.asarray(matrix)[:3, :3] @ np.full(3, 3 ** -0.5))
+    if length == 0.0:
+        raise BrumeError("TRANSFORM", "its transform is singular.")
+    return 1.0 / length
 
 
 def program_for(target, programs, material, available):
@@ -86,19 +90,41 @@ def _on_disk(path):
     yield _File(path, (path, stamp))
 
 
+# Voxels along a side that no field of smoke has, but a box around stray voxels.
+_WIDEST = 1 << 15
+
+# The frame that Blender gives where a sequence has none.
+_NO_FRAME = 2 ** 31 - 1
+
+
+def frame_path(volume, library=None):
+    """The file that an evaluated Volume reads at its frame; None outside of a sequence. This is
+    grids.frame_filepath, but that is known only to grids.load(), and in 3.4 a damaged file ends
+    Blender there."""
+    path = bpy.path.abspath(volume.filepath, library=library)
+    # The frame's digits stand right before the extension.
+    parts = re.fullmatch(r"(.*?)(\d+)(\.[^./]*)", path, re.DOTALL)
+    if not volume.is_sequence or not parts:
+        return path
+    frame = volume.grids.frame
+    if frame == _NO_FRAME:
+        return None
+    head, digits, extension = parts.groups()
+    return f"{head}{'-' if frame < 0 else ''}{abs(frame):0{len(digits)}}{extension}"
+
+
 def _file_of(ob):
     """A context that gives the file of a volume object, or None where it has no grids at all."""
     volume, original = ob.data, ob.original
-    if original.type == 'VOLUME' and not original.modifiers and volume.filepath:
+    if original.type == 'VOLUME' and volume.filepath:
         packed = original.data.packed_file
-        if packed:  # Blender itself does not read these once the file is gone
-            return _from_memory(lambda path: Path(path).write_bytes(packed.data))
-        volume.grids.load()
-        path = volume.grids.frame_filepath
-        if not path and volume.grids.error_message:
-            path = volume.filepath  # not there; the library says so
-        # Otherwise no path means that the frame lies outside of a sequence that ends there.
-        return _on_disk(bpy.path.abspath(path, library=original.data.library)) if path else None
+        path = frame_path(volume, original.data.library)
+        if not original.modifiers:
+            if packed:  # Blender itself does not read these once the file is gone
+                return _from_memory(lambda path: Path(path).write_bytes(packed.data))
+            return _on_disk(path) if path else None
+        if path and not packed:
+            vdb_list(path)  # raises if the file is damaged, before Blender opens it
     volume.grids.load()
     if len(volume.grids):
         return _from_memory(lambda path: _save(volume, path))
@@ -121,11 +147,21 @@ def export_volume_object(target, programs, ob, matrix, key, override=None):
         for name in program.unknown:
             target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": no grid "{name}" in '
                                                 f"{file.path}; it reads as 0.")
+        for name in program.unused:
+            target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": no grid "{name}" in '
+                                                f"{file.path}; Principled Volume does without.")
         if not program.grids:
             target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": its material uses none of '
                                                 f"the grids in {file.path}; it is left out.")
             return
         grids = [file.grid(target, name) for name in program.grids]
+        for name in program.grids:
+            width = max(file.infos[name].file_dims)
+            if width > _WIDEST:
+                target.reports.warn(
+                    "GRID_WIDE", f'Volume "{ob.name}": the grid "{name}" in {file.path} is {width} '
+                                 f"voxels wide. All volumes get as coarse as its box is large: "
+                                 f"are there stray voxels far away?")
         scale = density_scale(matrix) if ob.data.render.space == 'OBJECT' else 1.0
         target.put("volume", key, name=ob.name, program=program, grids=grids,
                    world_from_object=matrix, scale=scale)

@@ -30,6 +30,7 @@ class Program:
     emission: int
     grids: tuple
     unknown: tuple = ()  # attributes that the medium lacks and that read as 0
+    unused: tuple = ()   # attributes of Principled Volumes that the medium lacks
     constants: dict = field(default_factory=dict)  # results that are the same everywhere
 
     def fingerprint(self):
@@ -55,6 +56,7 @@ class VolumeBuilder(Builder):
         self.available = available
         self.grids = []
         self.unknown = []
+        self.unused = []
         self.handlers["ShaderNodeAttribute"] = type(self)._attribute
         self.handlers["ShaderNodeVolumeInfo"] = type(self)._volume_info
 
@@ -69,6 +71,16 @@ class VolumeBuilder(Builder):
         if name not in self.grids:
             self.grids.append(name)
         return self.leaf("GRID", self.grids.index(name))
+
+    def factor(self, name):
+        """The grid that an attribute of a Principled Volume names; None leaves its factor alone,
+        as in Cycles."""
+        if self.has(name):
+            return self.grid(name)
+        # Meshes and worlds have no grids at all; the node's own "density" is no mistake there.
+        if name and self.available and name not in self.unused:
+            self.unused.append(name)
+        return None
 
     def _attribute(self, source):
         node = source.node
@@ -154,20 +166,19 @@ def _principled(builder, source):
         source, "Color", "Density", "Anisotropy", "Absorption Color", "Emission Strength",
         "Emission Color", "Blackbody Intensity", "Blackbody Tint", "Temperature")
     density = op("MAXIMUM", density, 0.0)
-    # An attribute that the medium lacks leaves its factor alone.
-    name = _attribute_name(source, "Density Attribute")
-    if builder.has(name):
-        density = op("MAXIMUM", op("MULTIPLY", density, op("AVERAGE", builder.grid(name))), 0.0)
-    name = _attribute_name(source, "Color Attribute")
-    if builder.has(name):
-        color = op("MULTIPLY", color, builder.grid(name))
+    field = builder.factor(_attribute_name(source, "Density Attribute"))
+    if field is not None:
+        density = op("MAXIMUM", op("MULTIPLY", density, op("AVERAGE", field)), 0.0)
+    field = builder.factor(_attribute_name(source, "Color Attribute"))
+    if field is not None:
+        color = op("MULTIPLY", color, field)
     root = op("SQRT", op("MAXIMUM", absorption, 0.0))
     sigma_a = op("MULTIPLY", op("MULTIPLY", builder.clear(color), builder.clear(root)), density)
     emission = op("MULTIPLY", strength, glow)
     if not bb_share.is_constant(0):
-        name = _attribute_name(source, "Temperature Attribute")
-        if builder.has(name):
-            kelvin = op("MULTIPLY", kelvin, op("AVERAGE", builder.grid(name)))
+        field = builder.factor(_attribute_name(source, "Temperature Attribute"))
+        if field is not None:
+            kelvin = op("MULTIPLY", kelvin, op("AVERAGE", field))
         kelvin = op("MAXIMUM", kelvin, 0.0)
         square = op("MULTIPLY", kelvin, kelvin)
         power = op("MULTIPLY", op("MIX", 1.0, op("MULTIPLY", square, square), bb_share),
@@ -284,7 +295,8 @@ def _program(builder, medium):
     ramps = np.array(builder.ramps, np.float32).reshape(-1, RAMP_SIZE, 3)
     constants = {name: root.value for name, root in results.items() if root.constant}
     return Program(code, ramps, **registers, grids=tuple(builder.grids),
-                   unknown=tuple(builder.unknown), constants=constants)
+                   unknown=tuple(builder.unknown), unused=tuple(builder.unused),
+                   constants=constants)
 
 
 def compile_volume(tree, available, warn):

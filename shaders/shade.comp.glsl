@@ -75,12 +75,15 @@ uint world_step(uint count)
 vec3 world_diffuse(surface s, vec3 p, ivec2 pixel, float within)
 {
     vec3 sum = vec3(0.0);
-    // From a start of its own, so that what few directions do not resolve becomes grain, not bands.
-    uint start = pixel_hash(pixel, 7u) % frame.world.y;
-    uint first = uint(frame.size.z) * frame.world.z % frame.world.y;
-    uint stride = world_step(frame.world.y);
+    // A pixel's samples take every so-manieth direction, which are spread as evenly as all are, from
+    // a start of its own: what few directions do not resolve becomes grain rather than bands.
+    uint every = max(frame.world.y / (frame.world.z * uint(frame.clip.w)), 1u);
+    uint taken = frame.world.y / every;
+    uint start = pixel_hash(pixel, 7u);
+    uint first = uint(frame.size.z) * frame.world.z % taken;
+    uint stride = world_step(taken);
     for (uint i = 0u; i < frame.world.z; ++i) {
-        uint turn = (start + (first + i) * stride) % frame.world.y;
+        uint turn = (start % frame.world.y + every * ((first + i) * stride % taken)) % frame.world.y;
         gpu_light_sample w = light_samples[frame.world.x + turn];
         vec3 reflected = bsdf_diffuse(s, w.position.xyz);
         if (reflected == vec3(0.0))

@@ -74,8 +74,8 @@ class BrumeSettings(bpy.types.PropertyGroup):
                     "and memory grow in proportion")
     world_samples: IntProperty(
         name="World Samples", default=_DEFAULT["world_samples"], min=1, max=1024, soft_max=512,
-        description="Directions that stand for the world's light, each with a small shadow map. More "
-                    "soften its shadows and catch smaller bright spots of an environment "
+        description="Directions that stand for the world's light, each with a small shadow map. "
+                    "More soften its shadows and catch smaller bright spots of an environment "
                     "texture; time and memory grow in proportion")
     step: FloatProperty(
         name="Step", default=_DEFAULT["step"], min=0.05, max=16.0, soft_max=4.0, precision=2,

@@ -183,12 +183,76 @@ def test_a_failed_render_is_no_crash_and_the_next_works(scene, render, monkeypat
     assert render("b")[12, 16, 3] > 0.9
 
 
-def test_persistent_data_and_animation(scene, tmp_path):
+@pytest.mark.parametrize("persistent", [False, True])
+def test_animation(scene, tmp_path, persistent):
     lit(scene)
+    fog = bpy.data.objects["Fog"]
+    for frame, height in ((1, 0.0), (2, 0.7), (3, 0.0)):
+        fog.location.z = height
+        fog.keyframe_insert("location", frame=frame)
+    scene.render.use_persistent_data = persistent
     scene.render.filepath = str(tmp_path / "frame_")
-    scene.frame_start, scene.frame_end = 1, 2
+    scene.frame_start, scene.frame_end = 1, 3
     bpy.ops.render.render(animation=True)
-    assert len(list(tmp_path.glob("frame_*.exr"))) == 2
+    one, two, three = (native.exr_read(path) for path in sorted(tmp_path.glob("frame_*.exr")))
+    assert np.array_equal(one, three)
+    assert not np.array_equal(one, two)
+
+
+def test_linked_collection(scene, render, tmp_path):
+    """An instance of a library's collection looks as its objects do where they are at home,
+    whatever unit the scene shows its lengths in."""
+    lit(scene)
+    kit = bpy.data.collections.new("Kit")
+    scene.collection.children.link(kit)
+    for name in ("Fog", "Sun"):
+        ob = bpy.data.objects[name]
+        scene.collection.objects.unlink(ob)
+        kit.objects.link(ob)
+    whole = render()
+    path = tmp_path / "kit.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    bpy.data.collections.remove(kit)
+    for name in ("Fog", "Sun"):
+        bpy.data.objects.remove(bpy.data.objects[name])
+    with bpy.data.libraries.load(str(path), link=True) as (_, linked):
+        linked.collections = ["Kit"]
+    empty = bpy.data.objects.new("Instance", None)
+    empty.instance_type, empty.instance_collection = 'COLLECTION', linked.collections[0]
+    scene.collection.objects.link(empty)
+    scene.unit_settings.scale_length = 0.01
+    assert np.array_equal(render("b"), whole)
+
+
+def test_another_scene_between(scene, render, tmp_path):
+    lit(scene)
+    whole = render()
+    other = bpy.data.scenes.new("Other")
+    other.render.engine = 'BRUME'
+    other.render.resolution_x, other.render.resolution_y = 16, 12
+    other.render.filepath = str(tmp_path / "other.png")
+    other.collection.objects.link(scene.camera)
+    other.camera = scene.camera
+    bpy.ops.render.render(write_still=True, scene="Other")
+    assert (tmp_path / "other.png").exists()
+    assert np.array_equal(render("b"), whole)
+
+
+def test_a_simulation_beyond_its_cache(tmp_path):
+    """Frame 66 alone is cached: before and after, there is no smoke, and no report."""
+    bpy.ops.wm.open_mainfile(filepath=str(ROOT / "blend_scenes" / "plume.blend"))
+    scene = bpy.context.scene
+    scene.render.engine = 'BRUME'
+    scene.brume.preset = 'DRAFT'
+    scene.render.resolution_x, scene.render.resolution_y = 32, 18
+    scene.render.image_settings.file_format = 'OPEN_EXR'
+    scene.render.image_settings.color_depth = '32'
+    scene.frame_start, scene.frame_end = 65, 67
+    scene.render.filepath = str(tmp_path / "frame_")
+    bpy.ops.render.render(animation=True)
+    before, smoke, after = (native.exr_read(path) for path in sorted(tmp_path.glob("frame_*.exr")))
+    assert np.array_equal(before, after)
+    assert np.abs(smoke - before).mean() > 0.01 * before.mean()
 
 
 def test_presets(scene):

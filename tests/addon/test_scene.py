@@ -41,6 +41,16 @@ def test_fog_cube_is_no_surface(scene, export):
     assert not recorder.of("instances")
 
 
+def test_a_second_medium_is_reported(scene, export, target):
+    ob = cube("Both", material=fog("One"))
+    ob.data.materials.append(fog("Two"))
+    ob.data.materials.append(ob.data.materials["One"])
+    export()
+    (found, sentence), = target.reports
+    assert found == "UNSUPPORTED"
+    assert all(f'"{name}"' in sentence for name in ("Both", "One", "Two"))
+
+
 def test_glassy_fog_is_both(scene, export):
     both = fog()
     nodes = both.node_tree.nodes
@@ -504,3 +514,13 @@ def test_files_of_sequences(scene, tmp_path, name):
                     compared.add(path)
     if digits:
         assert len(compared) > 5
+
+
+def test_reach_of_the_worlds_volume(scene, export):
+    scene.world = bpy.data.worlds.new("World")
+    Nodes(scene.world)
+    assert export().world["reach"] == 0.0
+    scene.brume.world_reach = 7.0
+    assert export().world["reach"] == 7.0
+    scene.brume.world_unlimited = True
+    assert export().world["reach"] == -1.0

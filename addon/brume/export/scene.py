@@ -118,7 +118,10 @@ class _Export:
     def shape(self, ob):
         """Puts an object's mesh and finds its medium."""
         slots = self.materials(ob)
-        medium = next((m for m in slots if material.volume_tree(m)), None)
+        medium, *others = [m for m in slots if material.volume_tree(m)] or [None]
+        for name in sorted({other.name for other in others if other != medium}):
+            self.warn(ob, f'the volume of material "{name}" is not shown, since an object has one, '
+                          f'and that is of "{medium.name}".')
         domain = fluid.gas_domain(ob) is not None
         # Objects without modifiers share their evaluated mesh.
         shared = (ob.data.as_pointer(), tuple(m.as_pointer() if m else 0 for m in slots))

@@ -197,7 +197,7 @@ void march_media(inout march_state state, view_ray ray, float t_near, float t_fa
     if (fog_exists()) {
         fog = ray_box(ray.origin, ray.direction, frame.fog_lower.xyz, frame.fog_upper.xyz);
         // Beyond this depth of fog nothing is seen, however far it reaches.
-        vec3 sigma = frame.fog_sigma_t.rgb;
+        vec3 sigma = mix(frame.fog_sigma_t.rgb, vec3(1e30), equal(frame.fog_sigma_t.rgb, vec3(0.0)));
         float thinnest = min(min(sigma.r, sigma.g), sigma.b);
         fog.y = min(fog.y, max(fog.x, t_near) + 12.0 / max(thinnest, 1e-6));
         fog = vec2(max(fog.x, t_near), min(fog.y, t_far));

@@ -53,7 +53,11 @@ void job_warn(struct job_control *control, const char *id, const char *format, .
     vsnprintf(warning.sentence, sizeof warning.sentence, format, arguments);
     va_end(arguments);
     log_write(BRUME_LOG_INFO, "%s: %s", id, warning.sentence);
+    job_warn_again(control, &warning);
+}
 
+void job_warn_again(struct job_control *control, const struct job_warning *warning)
+{
     pthread_mutex_lock(&control->mutex);
     if (control->warning_count == control->warning_capacity) {
         const uint32_t capacity = control->warning_capacity ? control->warning_capacity * 2 : 8;
@@ -64,6 +68,6 @@ void job_warn(struct job_control *control, const char *id, const char *format, .
         }
     }
     if (control->warning_count < control->warning_capacity)
-        control->warnings[control->warning_count++] = warning;
+        control->warnings[control->warning_count++] = *warning;
     pthread_mutex_unlock(&control->mutex);
 }

@@ -34,5 +34,7 @@ bool job_cancelled_callback(void *control);
 void job_report(struct job_control *control, uint32_t stage, float progress);
 void job_warn(struct job_control *control, const char *id, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+/* Warns what an earlier job was warned of, since its product is used again. */
+void job_warn_again(struct job_control *control, const struct job_warning *warning);
 
 #endif

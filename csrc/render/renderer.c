@@ -50,6 +50,16 @@ static uint64_t float_bits(float value)
     return bits;
 }
 
+static void keep_warnings(struct stage_record *record, const struct job_warning *warnings,
+                          uint32_t count)
+{
+    free(record->warnings);
+    record->warnings = count ? malloc(count * sizeof *warnings) : NULL;
+    record->warning_count = record->warnings ? count : 0;
+    if (record->warnings)
+        memcpy(record->warnings, warnings, count * sizeof *warnings);
+}
+
 /* Runs the stage if its inputs changed since its last success. */
 static brume_result run_if_changed(struct run *run, enum brume_stage stage,
                                    const uint64_t *inputs, size_t count,
@@ -58,10 +68,15 @@ static brume_result run_if_changed(struct run *run, enum brume_stage stage,
     struct stage_record *record = &run->renderer->stages[stage];
     brume_stage_stats *stats = &run->request->stats.stages[stage];
     const uint64_t wanted = signature(inputs, count);
-    if (record->signature == wanted)
+    struct job_control *control = run->request->control;
+    if (record->signature == wanted) {
+        for (uint32_t i = 0; i < record->warning_count; ++i)
+            job_warn_again(control, &record->warnings[i]);
         return BRUME_OK;
-    if (job_cancelled(run->request->control))
+    }
+    if (job_cancelled(control))
         return fail(BRUME_E_CANCELLED, "cancelled");
+    const uint32_t warned = control->warning_count; /* only this thread adds to them */
     record->signature = 0;
     ++record->runs;
     ++record->revision;
@@ -69,8 +84,10 @@ static brume_result run_if_changed(struct run *run, enum brume_stage stage,
     timer_begin(&timer, brume_stage_name(stage));
     const brume_result result = work(run);
     timer_end(&timer, &stats->wall_ms, &stats->gpu_ms);
-    if (result == BRUME_OK)
+    if (result == BRUME_OK) {
         record->signature = wanted;
+        keep_warnings(record, control->warnings + warned, control->warning_count - warned);
+    }
     return result;
 }
 
@@ -407,6 +424,8 @@ void renderer_finish(struct gpu *gpu, struct renderer *renderer)
 {
     geometry_finish(gpu, &renderer->geometry);
     medium_textures_finish(gpu, &renderer->medium);
+    for (int stage = 0; stage < BRUME_STAGE_COUNT; ++stage)
+        free(renderer->stages[stage].warnings);
     shadows_finish(gpu, &renderer->shadows);
     transport_finish(gpu, &renderer->transport);
     view_finish(gpu, &renderer->targets);

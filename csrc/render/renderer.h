@@ -12,6 +12,8 @@
 struct stage_record {
     uint64_t signature; /* of the inputs of the last run; 0: never, or it failed */
     uint64_t revision, runs;
+    struct job_warning *warnings; /* of the last run: they hold as long as its product */
+    uint32_t warning_count;
 };
 
 /* Bytes that each lattice and the shadow maps may take: what the budget leaves beside pictures,

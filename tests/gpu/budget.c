@@ -79,13 +79,22 @@ static void greedy_settings_are_cut(void **state)
     const brume_view view = view_of(32);
     brume_scene *scene = full_scene();
     brume_stats stats;
-    brume_job *job = render_within(scene, greedy, &view, 8 << 20, &stats);
-    for (int i = 0; i < 4; ++i)
-        if (!warned(job, ids[i]))
-            fail_msg("no warning %s", ids[i]);
-    assert_true(stats.peak_bytes > 3 << 20);
-    assert_true(stats.medium_dims[0] < 256 && stats.medium_dims[0] > 32);
-    brume_job_release(job);
+    uint32_t warnings = 0;
+    /* The second time nothing of the scene runs again, and its product is as coarse as it was. */
+    for (int time = 0; time < 2; ++time) {
+        brume_job *job = render_within(scene, greedy, &view, 8 << 20, &stats);
+        for (int i = 0; i < 4; ++i)
+            if (!warned(job, ids[i]))
+                fail_msg("no warning %s at time %d", ids[i], time);
+        brume_job_status status;
+        assert_ok(brume_job_poll(job, &status));
+        assert_true(time == 0 || status.warnings == warnings);
+        warnings = status.warnings;
+        assert_true(stats.peak_bytes > 3 << 20);
+        assert_true(stats.medium_dims[0] < 256 && stats.medium_dims[0] > 32);
+        assert_int_equal(stats.stages[BRUME_STAGE_MEDIUM].runs, 1);
+        brume_job_release(job);
+    }
     brume_scene_destroy(scene);
 }
 

@@ -26,12 +26,16 @@ def identity(datablock):
     return f"{original.bl_rna.identifier}:{original.name_full}:{library}"
 
 
+def has_use_nodes():
+    """From 5.0 on use_nodes is always true and warns when read."""
+    return bpy.app.version < (5, 0, 0)
+
+
 def node_tree(owner):
-    """The node tree that counts for a material, world or light, or None. From 5.0 on use_nodes
-    is always true and warns when read."""
+    """The node tree that counts for a material, world or light, or None."""
     if owner.node_tree is None:
         return None
-    if bpy.app.version < (5, 0, 0) and not owner.use_nodes:
+    if has_use_nodes() and not owner.use_nodes:
         return None
     return owner.node_tree
 
@@ -93,9 +97,19 @@ def light_is_portal(light):
     return bool(getattr(getattr(light, "cycles", None), "is_portal", False))
 
 
+# Of lamps, since 4.5.
+LIGHT_PROPERTIES = ("exposure", "use_temperature", "temperature")
+
+
+def has_blend_method():
+    """4.2 took EEVEE's blend methods away."""
+    return bpy.app.version < (4, 2, 0)
+
+
 def alpha_clips(material):
-    """EEVEE's alpha clip, which 4.2 took away."""
-    return bpy.app.version < (4, 2, 0) and material.blend_method == 'CLIP'
+    """EEVEE's alpha clip."""
+    return has_blend_method() and material.blend_method == 'CLIP'
+
 
 
 def needs_node_categories():

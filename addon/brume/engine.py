@@ -58,6 +58,9 @@ class BrumeEngine(bpy.types.RenderEngine):
         with stage.lock:
             self.update_stats("", "Brume | Exporting")
             scene.export(depsgraph, stage.target)
+            if depsgraph.scene_eval.render.use_multiview:
+                stage.target.reports.unsupported(
+                    f'Scene "{depsgraph.scene.name}"', "all views of stereoscopy are alike.")
             view, passes = self._view(depsgraph, result, stage.target)
             warnings = list(stage.target.reports)
             exported = time.perf_counter()
@@ -131,12 +134,10 @@ class BrumeEngine(bpy.types.RenderEngine):
     def _write(self, result, job, passes):
         layer = result.layers[0]
         for number, name, channels, _ in passes:
-            target = layer.passes.find_by_name(name, "")
-            if target is None:
-                self._warn([("PASS", f"Blender has no pass {name} in this result")])
-                continue
             pixels = job.read(number)
-            compat.set_pass(target, pixels[..., :len(channels)])
+            for target in layer.passes:  # one a view
+                if target.name == name:
+                    compat.set_pass(target, pixels[..., :len(channels)])
 
     def _warn(self, entries):
         """Reports what is not shown; in background, where reports are not seen, in print. The

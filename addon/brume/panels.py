@@ -7,15 +7,28 @@ from . import compat, native
 from .properties import PASSES
 
 
-class _RenderPanel:
+class _Panel:
     bl_space_type = 'PROPERTIES'
     bl_region_type = 'WINDOW'
-    bl_context = "render"
     COMPAT_ENGINES = {'BRUME'}
 
     @classmethod
     def poll(cls, context):
-        return context.engine in cls.COMPAT_ENGINES
+        return context.engine in cls.COMPAT_ENGINES and cls.applies(context)
+
+    @classmethod
+    def applies(cls, context):
+        return True
+
+    def split(self):
+        """The layout, with names at the left of the values."""
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        return self.layout
+
+
+class _RenderPanel(_Panel):
+    bl_context = "render"
 
 
 class _Rows:
@@ -23,9 +36,7 @@ class _Rows:
     rows = ()
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = self.split()
         for name in self.rows:
             layout.prop(context.scene.brume, name)
 
@@ -34,9 +45,7 @@ class BRUME_PT_sampling(_RenderPanel, bpy.types.Panel):
     bl_label = "Sampling"
 
     def draw(self, context):
-        layout, settings = self.layout, context.scene.brume
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.split(), context.scene.brume
         try:
             native.library()
         except native.BrumeError as error:
@@ -66,9 +75,7 @@ class BRUME_PT_world_volume(_RenderPanel, bpy.types.Panel):
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
-        layout, settings = self.layout, context.scene.brume
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout, settings = self.split(), context.scene.brume
         layout.prop(settings, "world_unlimited")
         row = layout.row()
         row.active = not settings.world_unlimited
@@ -98,48 +105,160 @@ class BRUME_PT_film(_RenderPanel, bpy.types.Panel):
     bl_options = {'DEFAULT_CLOSED'}
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = self.split()
         layout.prop(context.scene.render, "film_transparent")
         layout.prop(context.scene.render, "filter_size")
 
 
-class BRUME_PT_passes(_RenderPanel, bpy.types.Panel):
+class BRUME_PT_passes(_Panel, bpy.types.Panel):
     bl_label = "Passes"
     bl_context = "view_layer"
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = self.split()
         column = layout.column()
         for *_, switch in PASSES:
             owner, _, name = switch.rpartition(".")
             column.prop(getattr(context.view_layer, owner) if owner else context.view_layer, name)
 
 
+class BRUME_PT_override(_Panel, bpy.types.Panel):
+    bl_label = "Override"
+    bl_context = "view_layer"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        self.split().prop(context.view_layer, "material_override")
+
+
+class BRUME_PT_ray_visibility(_Panel, bpy.types.Panel):
+    bl_label = "Ray Visibility"
+    bl_context = "object"
+    bl_parent_id = "OBJECT_PT_visibility"
+
+    @classmethod
+    def applies(cls, context):
+        return context.object and context.object.type in {'MESH', 'CURVE', 'SURFACE', 'FONT',
+                                                          'META', 'LIGHT'}
+
+    def draw(self, context):
+        layout, ob = self.split(), context.object
+        layout.prop(ob, "visible_camera", text="Camera", toggle=False)
+        if ob.type != 'LIGHT':
+            layout.prop(ob, "visible_shadow", text="Shadow", toggle=False)
+
+
+class BRUME_PT_material_settings(_Panel, bpy.types.Panel):
+    """How alpha is read, where Blender has a setting for that."""
+    bl_label = "Settings"
+    bl_context = "material"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def applies(cls, context):
+        return context.material and compat.has_blend_method()
+
+    def draw(self, context):
+        layout, material = self.split(), context.material
+        layout.prop(material, "blend_method")
+        if material.blend_method == 'CLIP':
+            layout.prop(material, "alpha_threshold")
+
+
+class _LightPanel(_Panel):
+    bl_context = "data"
+    types = {'POINT', 'SUN', 'SPOT', 'AREA'}
+
+    @classmethod
+    def applies(cls, context):
+        return context.light and context.light.type in cls.types
+
+
+class BRUME_PT_light(_LightPanel, bpy.types.Panel):
+    bl_label = "Light"
+
+    def draw(self, context):
+        layout, light = self.layout, context.light
+        layout.row().prop(light, "type", expand=True)
+        self.split()
+        column = layout.column()
+        column.prop(light, "color")
+        column.prop(light, "energy")
+        for name in compat.LIGHT_PROPERTIES:
+            if hasattr(light, name):
+                column.prop(light, name)
+        column = layout.column()
+        if light.type == 'SUN':
+            column.prop(light, "angle")
+        elif light.type == 'AREA':
+            column.prop(light, "shape")
+            if light.shape in {'RECTANGLE', 'ELLIPSE'}:
+                column = layout.column(align=True)
+                column.prop(light, "size", text="Size X")
+                column.prop(light, "size_y", text="Y")
+            else:
+                column.prop(light, "size")
+            layout.prop(light, "spread")
+        else:
+            column.prop(light, "shadow_soft_size", text="Radius")
+        layout.prop(light, "use_shadow", text="Cast Shadow", toggle=False)
+
+
+class BRUME_PT_light_spot(_LightPanel, bpy.types.Panel):
+    bl_label = "Beam Shape"
+    bl_parent_id = "BRUME_PT_light"
+    types = {'SPOT'}
+
+    def draw(self, context):
+        layout, light = self.split(), context.light
+        layout.prop(light, "spot_size", text="Spot Size")
+        layout.prop(light, "spot_blend", text="Blend", slider=True)
+        layout.prop(light, "show_cone")
+
+
+class BRUME_PT_light_nodes(_LightPanel, bpy.types.Panel):
+    bl_label = "Nodes"
+
+    def draw(self, context):
+        layout, light = self.layout, context.light
+        if compat.has_use_nodes():
+            layout.prop(light, "use_nodes", icon='NODETREE', toggle=True)
+        tree = compat.node_tree(light)
+        if tree is None:
+            return
+        layout, output = self.split(), tree.get_output_node('ALL')
+        if output is None:
+            layout.label(text="No output node")
+        else:
+            layout.template_node_view(tree, output, output.inputs["Surface"])
+
+
 _CLASSES = (BRUME_PT_sampling, BRUME_PT_sampling_advanced, BRUME_PT_volumes,
             BRUME_PT_world_volume, BRUME_PT_lights, BRUME_PT_film, BRUME_PT_performance,
-            BRUME_PT_passes)
+            BRUME_PT_passes, BRUME_PT_override, BRUME_PT_ray_visibility,
+            BRUME_PT_material_settings, BRUME_PT_light, BRUME_PT_light_spot,
+            BRUME_PT_light_nodes)
 
 # EEVEE's panels that show what Brume reads too.
 _ADDED = {
     'MATERIAL_PT_preview', 'EEVEE_MATERIAL_PT_context_material', 'EEVEE_MATERIAL_PT_surface',
-    'EEVEE_MATERIAL_PT_volume', 'EEVEE_WORLD_PT_surface', 'EEVEE_WORLD_PT_volume',
-    'DATA_PT_EEVEE_light', 'DATA_PT_EEVEE_shadow'}
+    'EEVEE_MATERIAL_PT_volume', 'EEVEE_WORLD_PT_surface', 'EEVEE_WORLD_PT_volume'}
+# What Brume does not do, or shows in panels of its own.
 _LEFT_OUT = {
     'VIEWLAYER_PT_filter', 'VIEWLAYER_PT_layer_passes', 'DATA_PT_light', 'DATA_PT_area',
-    'DATA_PT_falloff_curve'}
+    'DATA_PT_spot', 'DATA_PT_falloff_curve', 'RENDER_PT_stereoscopy', 'RENDER_PT_output_views',
+    'DATA_PT_camera_stereoscopy'}
 
 
 def blender_panels():
     """Blender's panels that apply: those for engines in general, and some of EEVEE's."""
     for panel in bpy.types.Panel.__subclasses__():
         engines = getattr(panel, "COMPAT_ENGINES", None)
-        if engines is None or panel.__name__ in _LEFT_OUT:
+        # A panel that the node editor shows too is there twice, with one set of engines.
+        name = panel.__name__.removeprefix("NODE_")
+        if engines is None or name in _LEFT_OUT:
             continue
-        if panel.__name__ in _ADDED or 'BLENDER_RENDER' in engines:
+        if name in _ADDED or 'BLENDER_RENDER' in engines:
             yield panel
 
 

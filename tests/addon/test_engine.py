@@ -164,6 +164,18 @@ def test_two_view_layers(scene, tmp_path):
     assert "ViewLayer.Depth.Z" not in names
 
 
+def test_stereoscopy_is_reported(scene, render, reported, tmp_path):
+    lit(scene)
+    whole = render()
+    scene.render.use_multiview = True
+    scene.render.filepath = str(tmp_path / "view.exr")
+    bpy.ops.render.render(write_still=True)
+    for name in "LR":
+        assert np.array_equal(native.exr_read(tmp_path / f"view_{name}.exr"), whole)
+    assert len(reported) == 1
+    assert "stereoscopy" in reported[0]
+
+
 def test_no_camera(scene, render):
     lit(scene)
     bpy.data.objects.remove(scene.camera)
@@ -269,9 +281,23 @@ def test_presets(scene):
 def test_panels_apply():
     marked = [panel.__name__ for panel in bpy.types.Panel.__subclasses__()
               if 'BRUME' in getattr(panel, "COMPAT_ENGINES", ())]
-    for name in ('EEVEE_MATERIAL_PT_surface', 'EEVEE_MATERIAL_PT_volume', 'DATA_PT_EEVEE_light',
+    for name in ('EEVEE_MATERIAL_PT_surface', 'EEVEE_MATERIAL_PT_volume', 'BRUME_PT_light',
                  'EEVEE_WORLD_PT_surface', 'RENDER_PT_format', 'DATA_PT_volume_file'):
         assert name in marked, name
+
+
+def test_no_panel_is_there_twice():
+    """None in one tab under one name, but where the kind of object decides."""
+    found = {}
+    for panel in bpy.types.Panel.__subclasses__():
+        if 'BRUME' not in getattr(panel, "COMPAT_ENGINES", ()):
+            continue
+        if panel.bl_space_type == 'PROPERTIES' and not hasattr(panel, "bl_parent_id"):
+            found.setdefault((getattr(panel, "bl_context", ""), panel.bl_label), []).append(panel)
+    assert [panel.__name__ for panel in found["data", "Light"]] == ['BRUME_PT_light']
+    for (context, label), panels in found.items():
+        if context in {"render", "output", "view_layer", "scene", "world", "object"} and label:
+            assert len(panels) == 1, (context, label)
 
 
 # -- other processes

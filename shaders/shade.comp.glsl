@@ -55,33 +55,15 @@ float world_shadow(gpu_light_sample w, vec3 p, vec3 normal)
                                                w.position.xyz);
 }
 
-// A step through the world's samples that visits all of them, each far from the last: prime to
-// their count, and near the share of a low-discrepancy sequence that no other lot follows.
-uint world_step(uint count)
-{
-    uint wanted = max(uint(0.8191725134 * float(count)), 1u);
-    for (;; ++wanted) {
-        uint a = count, b = wanted;
-        while (b != 0u) {
-            uint rest = a % b;
-            a = b;
-            b = rest;
-        }
-        if (a == 1u)
-            return wanted;
-    }
-}
-
 vec3 world_diffuse(surface s, vec3 p, ivec2 pixel, float within)
 {
     vec3 sum = vec3(0.0);
     // A pixel's samples take every so-manieth direction, which are spread as evenly as all are, from
     // a start of its own: what few directions do not resolve becomes grain rather than bands.
-    uint every = max(frame.world.y / (frame.world.z * uint(frame.clip.w)), 1u);
+    uint every = frame.counts.z, stride = frame.counts.w;
     uint taken = frame.world.y / every;
     uint start = pixel_hash(pixel, 7u);
     uint first = uint(frame.size.z) * frame.world.z % taken;
-    uint stride = world_step(taken);
     for (uint i = 0u; i < frame.world.z; ++i) {
         uint turn = (start % frame.world.y + every * ((first + i) * stride % taken)) % frame.world.y;
         gpu_light_sample w = light_samples[frame.world.x + turn];

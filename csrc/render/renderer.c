@@ -131,6 +131,23 @@ static brume_result work_medium(struct run *run)
     return result;
 }
 
+/* A step through `count` things that visits all of them, each far from the last: prime to their
+ * count, and near the share of a low-discrepancy sequence that no lot of the shaders follows. */
+static uint32_t spread_step(uint32_t count)
+{
+    const uint32_t wanted = (uint32_t)(0.8191725134 * count);
+    for (uint32_t step = wanted ? wanted : 1;; ++step) {
+        uint32_t a = count, b = step;
+        while (b) {
+            const uint32_t rest = a % b;
+            a = b;
+            b = rest;
+        }
+        if (a == 1 || count == 0)
+            return step;
+    }
+}
+
 static void set_world(struct run *run)
 {
     struct renderer *renderer = run->renderer;
@@ -147,9 +164,12 @@ static void set_world(struct run *run)
     const uint32_t samples = run->request->view.samples;
     /* A pixel need not see all of many directions: its neighbours see the others. */
     const uint32_t seen = count < WORLD_SAMPLES_A_PIXEL ? count : WORLD_SAMPLES_A_PIXEL;
-    frame->world = (uvec4){renderer->shadows.world_first, count, (seen + samples - 1) / samples,
+    const uint32_t each = (seen + samples - 1) / samples;
+    const uint32_t every = count > each * samples ? count / (each * samples) : 1;
+    frame->world = (uvec4){renderer->shadows.world_first, count, each,
                            renderer->shadows.world_faces};
-    frame->counts = (uvec4){renderer->shadows.light_count, (uint32_t)renderer->shadows.side, 0, 0};
+    frame->counts = (uvec4){renderer->shadows.light_count, (uint32_t)renderer->shadows.side, every,
+                            spread_step(count / every)};
     glBindTextureUnit(SLOT_WORLD, image ? image->texture.id : 0);
 }
 

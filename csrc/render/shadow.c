@@ -15,6 +15,7 @@
 #define COARSE_SIDE 128   /* texels: below this, fewer samples hurt less than coarser maps */
 #define LEAST_SIDE 16
 #define FEW_DIRECTIONS 16 /* of the world */
+#define MAPS_A_FINISH 8   /* on a CPU */
 #define WORLD_TILES 4     /* maps of the world in one layer */
 
 static float radius_of(const struct geometry *geometry, float center[3])
@@ -351,8 +352,8 @@ brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geo
         const struct gpu_draw stage = {.clip_from_world = shadows->views[i].clip_from_world,
                                        .info = {i, 0, 0, 0}};
         TRY(geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_SHADOW, 1));
-        if (gpu->context.info.software)
-            glFinish(); /* so that a cancel comes through between two maps */
+        if (gpu->context.info.software && i % MAPS_A_FINISH == MAPS_A_FINISH - 1)
+            glFinish(); /* so that a cancel comes through between some maps */
         job_report(control, BRUME_STAGE_SHADOW, 0.02f + 0.08f * (float)(i + 1) /
                                                             (float)shadows->view_count);
     }

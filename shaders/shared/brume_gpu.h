@@ -159,7 +159,8 @@ struct gpu_frame {
     vec4 world_color;    /* w: 1 if there is an image */
     mat4 image_from_world;
     uvec4 world;         /* first sample, count, samples a pixel takes each time, maps a sample */
-    uvec4 counts;        /* lights; shadow maps' side */
+    uvec4 counts;        /* lights; shadow maps' side; a pixel takes every z-th of the world's
+                            samples, in an order of steps of w among them */
     vec4 march;          /* step, m; steps in fog alone; rows of this dispatch: first, end */
     ivec4 pass_slots[2]; /* slot of each pass in the accumulation buffer, -1: not wanted */
 };

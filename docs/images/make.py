@@ -96,4 +96,6 @@ for wanted in sys.argv[1:] or (*SCENES, "panels"):
         scene(wanted)
     else:
         sys.exit(f"make.py: there is no picture {wanted}")
+    # Blender stamps the file's path into a picture.
+    subprocess.run(["mogrify", "-strip", HERE / f"{wanted}.png"], check=True)
     print(HERE / f"{wanted}.png")

@@ -120,7 +120,7 @@ static double phase(double cosine, double g)
     return (1.0 - g * g) / (4.0 * 3.14159265358979 * pow(1.0 + g * g - 2.0 * g * cosine, 1.5));
 }
 
-/* Reflection of a slab of optical thickness tau, lit at mu0, seen at mu (REFERENCE_VALUES' formula:
+/* Reflection of a slab of optical thickness tau, lit at mu0, seen at mu (after
  * Chandrasekhar, "Radiative Transfer", 1950, section 65): a wide plate of medium is the slab. */
 static void scattering_slab(void **state)
 {

@@ -8,11 +8,6 @@ layout(std430, binding = SLOT_INSTANCES) readonly buffer instances_block
     gpu_instance instances[];
 };
 
-layout(std140, binding = SLOT_STAGE) uniform stage_block
-{
-    gpu_draw stage;
-};
-
 in vec3 world_position;
 in vec3 world_normal;
 in vec2 uv;
@@ -53,7 +48,7 @@ void main()
     float roughness = material.diffuse.w;
     if ((material.flags.x & MATERIAL_ROUGHNESS_IMAGE) != 0u)
         roughness *= texture(roughness_image, uv).r;
-    bool holdout = (instances[instance_number].flags.x & 4u) != 0u;
+    bool holdout = (instances[instance_number].flags.x & VISIBLE_HOLDOUT) != 0u;
     out_normal = vec4(normal, depth);
     out_diffuse = vec4(material.diffuse.rgb * base.rgb, clamp(roughness, 0.0, 1.0));
     out_specular = vec4(material.specular.rgb + material.metal.rgb * base.rgb, holdout ? 1.0 : 0.0);

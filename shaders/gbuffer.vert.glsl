@@ -5,9 +5,6 @@
 
 out vec3 world_position;
 out vec3 world_normal;
-out vec2 uv;
-flat out uint material_number;
-flat out uint instance_number;
 
 void main()
 {
@@ -15,10 +12,5 @@ void main()
     vec4 p = instance.world_from_object * vec4(in_position, 1.0);
     world_position = p.xyz;
     world_normal = mat3(instance.normal_from_object) * in_normal;
-    uv = in_uv;
-    material_number = in_material;
-    instance_number = in_instance;
-    gl_Position = stage.clip_from_world * p;
-    if ((instance.flags.x & 1u) == 0u)
-        gl_Position = vec4(0.0, 0.0, 2.0, 1.0); // not visible to the camera: outside the clip box
+    place_corner(p, VISIBLE_CAMERA);
 }

@@ -3,11 +3,6 @@
 #version 450 core
 #include "lib/material.glsl"
 
-layout(std140, binding = SLOT_STAGE) uniform stage_block
-{
-    gpu_draw stage;
-};
-
 in vec2 uv;
 flat in uint material_number;
 flat in uint instance_number;

@@ -3,6 +3,7 @@
 #include "render/geometry.h"
 #include "base/result.h"
 #include "math/frame.h"
+#include "scene/pack.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -155,11 +156,6 @@ static const struct gpu_mesh *find_mesh(const struct geometry *geometry, uint64_
 }
 
 /* --- Materials ---------------------------------------------------------------------------- */
-
-static vec4 pack(const float rgb[3], float w)
-{
-    return (vec4){rgb[0], rgb[1], rgb[2], w};
-}
 
 static struct gpu_material material_to_gpu(const struct geometry *geometry, const brume_material *m)
 {

@@ -3,6 +3,7 @@
 #include "render/lattice.h"
 #include "base/result.h"
 #include "math/frame.h"
+#include "scene/pack.h"
 
 #include <math.h>
 #include <string.h>
@@ -33,11 +34,6 @@ static float longest(const struct box *box)
     for (int i = 0; i < 3; ++i)
         side = fmaxf(side, box->upper[i] - box->lower[i]);
     return side;
-}
-
-static vec4 pack(const float v[3], float w)
-{
-    return (vec4){v[0], v[1], v[2], w};
 }
 
 /* Nodes along the sides of a box for a number of cells along its longest. */

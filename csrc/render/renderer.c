@@ -187,7 +187,7 @@ static brume_result work_shadow(struct run *run)
     struct renderer *renderer = run->renderer;
     const struct render_request *request = run->request;
     job_report(request->control, BRUME_STAGE_SHADOW, 0.02f);
-    TRY(shadows_layout(run->gpu, &renderer->shadows, request->snapshot, &request->settings,
+    TRY(shadows_layout(&renderer->shadows, request->snapshot, &request->settings,
                        &renderer->geometry, &renderer->shadow_plan, request->control));
     TRY(shadows_upload(run->gpu, &renderer->shadows));
     return shadows_render(run->gpu, &renderer->shadows, &renderer->geometry, request->control);

@@ -222,12 +222,10 @@ brume_result shadows_plan(const struct snapshot *snapshot, const brume_settings 
     }
 }
 
-brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
-                            const struct snapshot *snapshot, const brume_settings *settings,
-                            const struct geometry *geometry, const struct shadow_plan *plan,
-                            struct job_control *control)
+brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snapshot,
+                            const brume_settings *settings, const struct geometry *geometry,
+                            const struct shadow_plan *plan, struct job_control *control)
 {
-    (void)gpu;
     const int casters = casts(geometry);
     const uint32_t wanted = plan->light_samples, world_count = plan->world_samples;
     const uint32_t distant = plan->distant;

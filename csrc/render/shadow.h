@@ -34,10 +34,9 @@ brume_result shadows_plan(const struct snapshot *snapshot, const brume_settings 
                           struct shadow_plan *plan);
 /* Lights, samples and shadow views from the snapshot, for casters within the geometry's bounds;
  * warns where the plan falls short of the settings. */
-brume_result shadows_layout(struct gpu *gpu, struct shadows *shadows,
-                            const struct snapshot *snapshot, const brume_settings *settings,
-                            const struct geometry *geometry, const struct shadow_plan *plan,
-                            struct job_control *control);
+brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snapshot,
+                            const brume_settings *settings, const struct geometry *geometry,
+                            const struct shadow_plan *plan, struct job_control *control);
 /* Uploads them: the tiles in lights[].info may have been set in between. */
 brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows);
 brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,

@@ -45,7 +45,6 @@ void view_frame(const brume_view *view, uint32_t sample, struct gpu_frame *frame
     float world_from_view[16], ndc[2];
     mat4_invert(view->view_from_world, world_from_view); /* checked when the job was made */
     sample_offset(view, sample, ndc);
-    memcpy(frame->view_from_world.m, view->view_from_world, sizeof frame->view_from_world.m);
     const float dx = 1.0f / p[0], dy = 1.0f / p[5];
     const vec4 eye = {world_from_view[12], world_from_view[13], world_from_view[14], 0.0f};
     if (is_orthographic(view)) {

@@ -4,6 +4,7 @@
 #include "scene/light.h"
 #include "base/result.h"
 #include "math/frame.h"
+#include "scene/pack.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -73,11 +74,6 @@ brume_result light_create(const brume_light *source, struct block **out)
 static float length3(const float v[3])
 {
     return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
-static vec4 pack(const float v[3], float w)
-{
-    return (vec4){v[0], v[1], v[2], w};
 }
 
 /* Column of the matrix as a unit vector and its length; a zero column gives the axis. */

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The frame's block, rays of a pixel, and the random numbers of a sample.
 #include "shared/brume_gpu.h"
+#include "lib/hash.glsl"
 
 const float PI = 3.14159265358979;
 
@@ -8,14 +9,6 @@ layout(std140, binding = SLOT_FRAME) uniform frame_block
 {
     gpu_frame frame;
 };
-
-// PCG hash, Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 2020.
-uint hash(uint x)
-{
-    uint state = x * 747796405u + 2891336453u;
-    uint word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
-    return (word >> 22u) ^ word;
-}
 
 uint pixel_hash(ivec2 pixel, uint stream)
 {

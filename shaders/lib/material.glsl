@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Materials and the alpha test of the drawing stages.
-#include "shared/brume_gpu.h"
+#include "lib/draw.glsl"
+#include "lib/hash.glsl"
 
 layout(std430, binding = SLOT_MATERIALS) readonly buffer materials_block
 {
@@ -33,14 +34,6 @@ float material_shadow_alpha(gpu_material material, float alpha)
                                      1.0);
 }
 
-// PCG, as in lib/frame.glsl.
-uint alpha_hash(uint x)
-{
-    uint state = x * 747796405u + 2891336453u;
-    uint word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
-    return (word >> 22u) ^ word;
-}
-
 // False where this sample sees through the surface. Blending is coverage, drawn by lot for every
 // pixel, surface and sample, so that the mean over the samples is exact in any order of surfaces.
 bool material_covers(gpu_material material, float alpha, vec2 pixel, uint surface, uint seed)
@@ -49,7 +42,7 @@ bool material_covers(gpu_material material, float alpha, vec2 pixel, uint surfac
         return alpha >= material.metal.w;
     if ((material.flags.x & MATERIAL_ALPHA_BLEND) == 0u)
         return true;
-    uint start = alpha_hash(uint(pixel.x) + alpha_hash(uint(pixel.y) + alpha_hash(surface)));
+    uint start = hash(uint(pixel.x) + hash(uint(pixel.y) + hash(surface)));
     // Another irrational than the world's directions follow: the samples that hit a surface must
     // see them all.
     float lot = fract(float(start) * (1.0 / 4294967296.0) + float(seed) * 0.6710436067);

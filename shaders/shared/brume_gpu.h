@@ -108,6 +108,11 @@ struct gpu_material {
     uvec4 flags;
 };
 
+/* As brume_visibility of brume.h. */
+#define VISIBLE_CAMERA 1u
+#define VISIBLE_SHADOW 2u
+#define VISIBLE_HOLDOUT 4u
+
 struct gpu_instance {
     mat4 world_from_object;
     mat4 normal_from_object; /* inverse transpose */
@@ -139,7 +144,6 @@ struct gpu_lattice_pass {
 #define PASS_COUNT 7
 
 struct gpu_frame {
-    mat4 view_from_world;
     vec4 ray_origin, ray_origin_x, ray_origin_y; /* ray = origin + x ndc.x + y ndc.y */
     vec4 ray_direction, ray_direction_x, ray_direction_y; /* view depth 1 per unit */
     ivec4 size;          /* width, height, number of this sample, seed */

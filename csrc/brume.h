@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* Raised by every change to a struct, an enumerator or a function below. */
-#define BRUME_ABI 1u
+#define BRUME_ABI 2u
 
 BRUME_API uint32_t brume_abi(void);
 
@@ -450,7 +450,9 @@ typedef struct brume_view {
     uint32_t film_transparent;       /* 1: the world is not drawn, alpha tells coverage */
     uint32_t passes;                 /* bits 1 << brume_pass; Combined always */
     uint32_t progressive;            /* 1: brume_job_read works while the job runs, on the mean of
-                                        the samples so far, renewed twice a second */
+                                        the samples so far: the first at once, then renewed five
+                                        times a second */
+    uint32_t urgent;                 /* 1: served before all jobs that are not: somebody waits */
 } brume_view;
 
 typedef enum brume_stage {
@@ -482,7 +484,9 @@ typedef struct brume_stats {
     int32_t medium_dims[3], transport_dims[3];
     uint32_t light_count, triangle_count; /* instances counted */
     uint32_t samples;
-    uint32_t reserved;
+    uint32_t shadow_maps_drawn;  /* by this job, as the two below: what did not change stays */
+    uint32_t lights_propagated;  /* lamps whose light was carried through the medium anew */
+    uint32_t sky_propagated;     /* how often the world's was */
 } brume_stats;
 
 typedef struct brume_job brume_job;
@@ -502,6 +506,7 @@ typedef struct brume_job_status {
     uint32_t samples_done;
     int32_t result;                  /* brume_result, once ended */
     uint32_t warnings;               /* how many so far */
+    uint32_t picture_samples;        /* that the picture of brume_job_read is made of, 0: none yet */
 } brume_job_status;
 
 BRUME_API brume_result brume_render(brume_scene *scene, const brume_settings *settings,

@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-ABI = 1
+ABI = 2
 PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONMENT",
           "TRANSMITTANCE")
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3)
@@ -156,7 +156,8 @@ class View(Structure):
     _fields_ = [("width", c_int32), ("height", c_int32), ("view_from_world", Mat4),
                 ("clip_from_view", Mat4), ("clip_near", c_float), ("clip_far", c_float),
                 ("samples", c_uint32), ("seed", c_uint32), ("filter_width", c_float),
-                ("film_transparent", c_uint32), ("passes", c_uint32), ("progressive", c_uint32)]
+                ("film_transparent", c_uint32), ("passes", c_uint32), ("progressive", c_uint32),
+                ("urgent", c_uint32)]
 
 
 class StageStats(Structure):
@@ -170,12 +171,14 @@ class Stats(Structure):
                 ("mesh_bytes", c_uint64), ("image_bytes", c_uint64), ("target_bytes", c_uint64),
                 ("total_bytes", c_uint64), ("peak_bytes", c_uint64), ("medium_dims", Dims),
                 ("transport_dims", Dims), ("light_count", c_uint32), ("triangle_count", c_uint32),
-                ("samples", c_uint32), ("reserved", c_uint32)]
+                ("samples", c_uint32), ("shadow_maps_drawn", c_uint32),
+                ("lights_propagated", c_uint32), ("sky_propagated", c_uint32)]
 
 
 class JobStatus(Structure):
     _fields_ = [("state", c_uint32), ("stage", c_uint32), ("progress", c_float),
-                ("samples_done", c_uint32), ("result", c_int32), ("warnings", c_uint32)]
+                ("samples_done", c_uint32), ("result", c_int32), ("warnings", c_uint32),
+                ("picture_samples", c_uint32)]
 
     @property
     def ended(self):

@@ -164,7 +164,8 @@ static void copy_status(const brume_job *job, brume_job_status *out)
                               .progress = job->control.progress,
                               .samples_done = job->control.samples_done,
                               .result = (int32_t)job->result,
-                              .warnings = job->control.warning_count};
+                              .warnings = job->control.warning_count,
+                              .picture_samples = job->picture.samples};
 }
 
 void job_poll(brume_job *job, brume_job_status *out)

@@ -15,7 +15,7 @@
 #define FOG_STEPS 24
 #define WORLD_SAMPLES_A_PIXEL 64u
 /* Between two pictures of a progressive job. */
-#define PICTURE_MS 500.0
+#define PICTURE_MS 200.0
 
 struct run {
     struct gpu *gpu;

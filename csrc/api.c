@@ -274,7 +274,7 @@ brume_result brume_job_wait(brume_job *job, int32_t timeout_ms, brume_job_status
 void brume_job_cancel(brume_job *job)
 {
     if (job)
-        job_cancel(&job->control);
+        job_stop(job);
 }
 
 const char *brume_job_error(const brume_job *job)

@@ -126,8 +126,8 @@ vec3 world_specular(surface s, vec3 p, ivec2 pixel, float within)
 
 void main()
 {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(pixel, frame.size.xy)))
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, int(frame.march.z));
+    if (any(greaterThanEqual(pixel, ivec2(frame.size.x, int(frame.march.w)))))
         return;
     vec4 normal_depth = texelFetch(gbuffer_normal, pixel, 0);
     vec3 radiance = vec3(0.0);

@@ -40,7 +40,8 @@ void job_report(struct job_control *control, uint32_t stage, float progress)
 {
     pthread_mutex_lock(&control->mutex);
     control->stage = stage;
-    control->progress = progress;
+    if (progress > control->progress) /* a stage that runs again takes nothing back */
+        control->progress = progress;
     pthread_mutex_unlock(&control->mutex);
 }
 

@@ -7,6 +7,29 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+/* Behind all others: the queue is as long as there are jobs, a few. */
+static void push(brume_device *device, struct task *task)
+{
+    struct task **end = &device->first;
+    while (*end)
+        end = &(*end)->next;
+    task->next = NULL;
+    *end = task;
+}
+
+/* The first of those of the lowest rank; NULL from an empty queue. */
+static struct task *pop(brume_device *device)
+{
+    struct task **best = &device->first;
+    for (struct task **place = best; *place; place = &(*place)->next)
+        if ((*place)->rank < (*best)->rank)
+            best = place;
+    struct task *task = *best;
+    if (task)
+        *best = task->next;
+    return task;
+}
+
 static void *thread_main(void *argument)
 {
     brume_device *device = argument;
@@ -24,21 +47,14 @@ static void *thread_main(void *argument)
     for (;;) {
         while (!device->first && !device->quit)
             pthread_cond_wait(&device->wake, &device->mutex);
-        struct task *task = device->first;
+        struct task *task = pop(device);
         if (!task)
             break;
-        device->first = task->next;
-        if (!device->first)
-            device->last = NULL;
         pthread_mutex_unlock(&device->mutex);
-        task->run(&device->gpu, task->user);
+        const bool more = task->step(&device->gpu, task->user);
         pthread_mutex_lock(&device->mutex);
-        if (task->done) {
-            *task->done = 1;
-            pthread_cond_broadcast(&device->idle);
-        } else {
-            free(task);
-        }
+        if (more)
+            push(device, task);
     }
     pthread_mutex_unlock(&device->mutex);
 
@@ -120,36 +136,60 @@ void device_destroy(brume_device *device)
     device_release(device);
 }
 
-static void push(brume_device *device, struct task *task)
+void device_post(brume_device *device, struct task *task)
 {
-    if (device->last)
-        device->last->next = task;
-    else
-        device->first = task;
-    device->last = task;
-    pthread_cond_broadcast(&device->wake);
-}
-
-brume_result device_post(brume_device *device, void (*run)(struct gpu *, void *), void *user)
-{
-    struct task *task = calloc(1, sizeof *task);
-    if (!task)
-        return fail(BRUME_E_MEMORY, "no memory to queue work for the device");
-    task->run = run;
-    task->user = user;
     pthread_mutex_lock(&device->mutex);
     push(device, task);
+    pthread_cond_broadcast(&device->wake);
     pthread_mutex_unlock(&device->mutex);
-    return BRUME_OK;
 }
 
-void device_call(brume_device *device, void (*run)(struct gpu *, void *), void *user)
+void device_hurry(brume_device *device, struct task *task)
 {
-    int done = 0;
-    struct task task = {.run = run, .user = user, .done = &done};
     pthread_mutex_lock(&device->mutex);
-    push(device, &task);
-    while (!done)
+    task->rank = TASK_ENDING;
+    pthread_mutex_unlock(&device->mutex);
+}
+
+void device_hurry_all(brume_device *device, const void *owner)
+{
+    pthread_mutex_lock(&device->mutex);
+    for (struct task *task = device->first; task; task = task->next)
+        if (task->owner == owner)
+            task->rank = TASK_ENDING;
+    pthread_mutex_unlock(&device->mutex);
+}
+
+/* A task that somebody waits for. */
+struct call {
+    struct task task;
+    brume_device *device;
+    bool (*step)(struct gpu *gpu, void *user);
+    void *user;
+    bool done; /* guarded by the device's mutex */
+};
+
+static bool step_call(struct gpu *gpu, void *user)
+{
+    struct call *call = user;
+    if (call->step(gpu, call->user))
+        return true;
+    brume_device *device = call->device;
+    pthread_mutex_lock(&device->mutex);
+    call->done = true; /* the caller's stack, gone once it sees this */
+    pthread_cond_broadcast(&device->idle);
+    pthread_mutex_unlock(&device->mutex);
+    return false;
+}
+
+void device_call(brume_device *device, bool (*step)(struct gpu *, void *), void *user)
+{
+    struct call call = {.task = {.step = step_call, .rank = TASK_ENDING},
+                        .device = device, .step = step, .user = user};
+    call.task.user = &call;
+    device_post(device, &call.task);
+    pthread_mutex_lock(&device->mutex);
+    while (!call.done)
         pthread_cond_wait(&device->idle, &device->mutex);
     pthread_mutex_unlock(&device->mutex);
 }

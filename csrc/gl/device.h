@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The device: one thread that owns one context and runs tasks in order. Any thread may post. */
+/* The device: one thread that owns one context and runs tasks, a step of each in turn. Any thread may
+ * post. */
 #ifndef BRUME_GL_DEVICE_H
 #define BRUME_GL_DEVICE_H
 
@@ -8,6 +9,7 @@
 #include "gl/program.h"
 
 #include <pthread.h>
+#include <stdbool.h>
 
 /* What the tasks of the device's thread work with. */
 struct gpu {
@@ -16,10 +18,19 @@ struct gpu {
     struct memory memory;
 };
 
+/* Tasks of a lower rank run before all of a higher one, those of one rank take turns. */
+enum task_rank {
+    TASK_ENDING, /* frees memory, or only has to see that it was cancelled */
+    TASK_URGENT,
+    TASK_PATIENT,
+};
+
+/* Belongs to who posts it, until the step that returns false. */
 struct task {
-    void (*run)(struct gpu *gpu, void *user);
+    bool (*step)(struct gpu *gpu, void *user); /* true: there is more to do */
     void *user;
-    int *done; /* set once it ran, where somebody waits; the waiter owns the task then */
+    const void *owner; /* what device_hurry_all knows it by; may be NULL */
+    enum task_rank rank; /* guarded by the device's mutex once posted, as next */
     struct task *next;
 };
 
@@ -32,7 +43,7 @@ struct brume_device {
     pthread_t thread;
     pthread_mutex_t mutex;
     pthread_cond_t wake, idle;
-    struct task *first, *last;
+    struct task *first; /* in the order of their turns */
     int quit, ready;
     brume_result start_result;
     char start_error[1024];
@@ -45,9 +56,11 @@ brume_device *device_retain(brume_device *device);
 void device_release(brume_device *device);
 
 /* Queues the task; never waits for it. */
-brume_result device_post(brume_device *device, void (*run)(struct gpu *, void *), void *user);
-/* Queues the task and returns when it has run, and with it all that was posted before. Cannot fail.
- * Not from the device's thread. */
-void device_call(brume_device *device, void (*run)(struct gpu *, void *), void *user);
+void device_post(brume_device *device, struct task *task);
+/* Serves a task that was posted, or all of an owner that wait, before others from now on. */
+void device_hurry(brume_device *device, struct task *task);
+void device_hurry_all(brume_device *device, const void *owner);
+/* Runs a task before others and returns when it is done. Not from the device's thread. */
+void device_call(brume_device *device, bool (*step)(struct gpu *, void *), void *user);
 
 #endif

@@ -7,6 +7,7 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -76,9 +77,9 @@ static void unreference(brume_job *job)
     free(job);
 }
 
-static void end(brume_job *job, brume_result result)
+/* With the control's mutex. */
+static void set_ended(brume_job *job, brume_result result)
 {
-    pthread_mutex_lock(&job->control.mutex);
     job->result = result;
     job->state = result == BRUME_OK          ? BRUME_JOB_DONE
                  : result == BRUME_E_CANCELLED ? BRUME_JOB_CANCELLED
@@ -88,36 +89,39 @@ static void end(brume_job *job, brume_result result)
     if (result == BRUME_OK)
         job->control.progress = 1.0f;
     pthread_cond_broadcast(&job->ended);
+}
+
+/* False if the job was cancelled before it began. */
+static bool begin(brume_job *job)
+{
+    pthread_mutex_lock(&job->control.mutex);
+    if (job->state == BRUME_JOB_QUEUED)
+        job->state = BRUME_JOB_RUNNING;
+    const bool running = job->state == BRUME_JOB_RUNNING;
     pthread_mutex_unlock(&job->control.mutex);
+    return running;
 }
 
 /* On the device's thread. */
-static void run_job(struct gpu *gpu, void *user)
+static bool step_job(struct gpu *gpu, void *user)
 {
     brume_job *job = user;
-    struct render_request request = {.snapshot = &job->snapshot,
-                                     .settings = job->settings,
-                                     .view = job->view,
-                                     .control = &job->control,
-                                     .front = &job->picture};
-    pthread_mutex_lock(&job->control.mutex);
-    job->state = BRUME_JOB_RUNNING;
-    pthread_mutex_unlock(&job->control.mutex);
-
-    brume_result result = BRUME_OK;
-    if (job_cancelled(&job->control))
-        result = fail(BRUME_E_CANCELLED, "cancelled");
-    if (result == BRUME_OK)
-        result = picture_init(&job->picture, &job->view);
-    if (result == BRUME_OK)
-        result = picture_init(&request.back, &job->view);
-    if (result == BRUME_OK)
-        result = renderer_run(gpu, &job->scene->renderer, &request);
-    picture_finish(&request.back);
+    brume_scene *scene = job->scene;
+    if (begin(job)) {
+        bool more = false;
+        const brume_result result =
+            renderer_step(gpu, &scene->renderer, &job->request, &more);
+        if (more)
+            return true;
+        pthread_mutex_lock(&job->control.mutex);
+        set_ended(job, result);
+        pthread_mutex_unlock(&job->control.mutex);
+    }
+    __atomic_sub_fetch(&scene->jobs, 1, __ATOMIC_RELEASE);
+    picture_finish(&job->request.back);
     snapshot_finish(&job->snapshot); /* a picture that is kept keeps no scene alive */
-    job->stats = request.stats;
-    end(job, result);
     unreference(job);
+    return false;
 }
 
 brume_result job_create(brume_scene *scene, const brume_settings *settings, const brume_view *view,
@@ -127,11 +131,14 @@ brume_result job_create(brume_scene *scene, const brume_settings *settings, cons
     brume_job *job = calloc(1, sizeof *job);
     if (!job)
         return fail(BRUME_E_MEMORY, "no memory for a job");
-    job->settings = settings ? *settings : default_settings;
-    job->view = *view;
-    brume_result result = check_settings(&job->settings);
+    job->request = (struct render_request){.snapshot = &job->snapshot,
+                                           .settings = settings ? *settings : default_settings,
+                                           .view = *view,
+                                           .control = &job->control,
+                                           .front = &job->picture};
+    brume_result result = check_settings(&job->request.settings);
     if (result == BRUME_OK)
-        result = check_view(&job->view);
+        result = check_view(&job->request.view);
     if (result == BRUME_OK)
         result = scene_snapshot(&scene->scene, &job->snapshot);
     if (result != BRUME_OK) {
@@ -140,6 +147,8 @@ brume_result job_create(brume_scene *scene, const brume_settings *settings, cons
     }
     job->references = 2;
     job->scene = scene;
+    job->task = (struct task){.step = step_job, .user = job, .owner = scene,
+                              .rank = view->urgent ? TASK_URGENT : TASK_PATIENT};
     job_control_init(&job->control);
     job->control.scene_closing = &scene->closing;
     pthread_condattr_t attributes;
@@ -147,14 +156,21 @@ brume_result job_create(brume_scene *scene, const brume_settings *settings, cons
     pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
     pthread_cond_init(&job->ended, &attributes);
     pthread_condattr_destroy(&attributes);
-    result = device_post(scene->device, run_job, job);
-    if (result != BRUME_OK) {
-        job->references = 1;
-        unreference(job);
-        return result;
-    }
+    __atomic_add_fetch(&scene->jobs, 1, __ATOMIC_RELAXED);
+    device_post(scene->device, &job->task);
     *out = job;
     return BRUME_OK;
+}
+
+void job_stop(brume_job *job)
+{
+    job_cancel(&job->control);
+    pthread_mutex_lock(&job->control.mutex);
+    if (job->state < BRUME_JOB_DONE)
+        device_hurry(job->scene->device, &job->task);
+    if (job->state == BRUME_JOB_QUEUED)
+        set_ended(job, BRUME_E_CANCELLED);
+    pthread_mutex_unlock(&job->control.mutex);
 }
 
 static void copy_status(const brume_job *job, brume_job_status *out)
@@ -208,10 +224,11 @@ static uint32_t state_of(brume_job *job)
 
 brume_result job_read(brume_job *job, uint32_t pass, float *pixels, uint64_t float_count)
 {
-    const uint64_t expected = (uint64_t)job->view.width * (uint64_t)job->view.height *
-                              brume_pass_channels(pass);
+    const brume_view *view = &job->request.view;
+    const uint64_t expected =
+        (uint64_t)view->width * (uint64_t)view->height * brume_pass_channels(pass);
     REQUIRE(float_count == expected);
-    if (!(job->view.passes & (1u << pass)))
+    if (!(view->passes & (1u << pass)))
         return fail(BRUME_E_NOT_READY, "the job was not asked for the pass %s",
                     brume_pass_name(pass));
     pthread_mutex_lock(&job->control.mutex);
@@ -226,14 +243,13 @@ brume_result job_stats(brume_job *job, brume_stats *out)
 {
     if (state_of(job) < BRUME_JOB_DONE)
         return fail(BRUME_E_NOT_READY, "the job has not ended");
-    *out = job->stats;
+    *out = job->request.stats;
     return BRUME_OK;
 }
 
 void job_release(brume_job *job)
 {
-    if (state_of(job) < BRUME_JOB_DONE)
-        job_cancel(&job->control);
+    job_stop(job);
     unreference(job);
 }
 
@@ -250,16 +266,22 @@ brume_result scene_open(brume_device *device, brume_scene **out)
     return BRUME_OK;
 }
 
-static void close_renderer(struct gpu *gpu, void *user)
+/* Its jobs end first: each sees that the scene closes in its next step, which comes now. */
+static bool step_close(struct gpu *gpu, void *user)
 {
     brume_scene *scene = user;
+    if (__atomic_load_n(&scene->jobs, __ATOMIC_ACQUIRE)) {
+        device_hurry_all(scene->device, scene);
+        return true;
+    }
     renderer_finish(gpu, &scene->renderer);
+    return false;
 }
 
 void scene_close(brume_scene *scene)
 {
     __atomic_store_n(&scene->closing, 1, __ATOMIC_RELEASE);
-    device_call(scene->device, close_renderer, scene);
+    device_call(scene->device, step_close, scene);
     device_release(scene->device);
     scene_finish(&scene->scene);
     free(scene);

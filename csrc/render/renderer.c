@@ -8,12 +8,15 @@
 #include "scene/medium.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Steps of a ray through the world's medium where there is no lattice. */
 #define FOG_STEPS 24
 #define WORLD_SAMPLES_A_PIXEL 64u
+/* Of one step on a CPU: a tenth of a second or so. */
+#define SOFTWARE_PIXELS 65536
 /* Between two pictures of a progressive job. */
 #define PICTURE_MS 200.0
 
@@ -69,13 +72,12 @@ static brume_result run_if_changed(struct run *run, enum brume_stage stage,
     brume_stage_stats *stats = &run->request->stats.stages[stage];
     const uint64_t wanted = signature(inputs, count);
     struct job_control *control = run->request->control;
-    if (record->signature == wanted) {
-        for (uint32_t i = 0; i < record->warning_count; ++i)
-            job_warn_again(control, &record->warnings[i]);
+    if (record->signature == wanted)
         return BRUME_OK;
-    }
     if (job_cancelled(control))
         return fail(BRUME_E_CANCELLED, "cancelled");
+    /* Products may grow up to their shares, which leave nothing for idle targets. */
+    view_pool_trim(run->gpu, &run->renderer->targets);
     const uint32_t warned = control->warning_count; /* only this thread adds to them */
     record->signature = 0;
     ++record->runs;
@@ -220,55 +222,58 @@ static brume_result work_transport(struct run *run)
 
 /* --- The view ----------------------------------------------------------------------------- */
 
-static brume_result stage_timed(struct run *run, enum brume_stage stage, uint32_t sample,
-                                brume_result (*work)(struct run *, uint32_t))
+static brume_result stage_timed(struct run *run, enum brume_stage stage,
+                                brume_result (*work)(struct run *))
 {
-    brume_stage_stats *stats = &run->request->stats.stages[stage];
-    const brume_view *view = &run->request->view;
-    if (job_cancelled(run->request->control))
+    struct render_request *request = run->request;
+    brume_stage_stats *stats = &request->stats.stages[stage];
+    if (job_cancelled(request->control))
         return fail(BRUME_E_CANCELLED, "cancelled");
-    job_report(run->request->control, stage,
-               0.25f + 0.74f * (float)sample / (float)view->samples);
+    const float rows = (float)request->row / (float)request->view.height;
+    job_report(request->control, stage,
+               0.25f + 0.74f * ((float)request->sample + rows) / (float)request->view.samples);
     struct timer timer;
     timer_begin(&timer, brume_stage_name(stage));
-    const brume_result result = work(run, sample);
+    const brume_result result = work(run);
     timer_end(&timer, &stats->wall_ms, &stats->gpu_ms);
     return result;
 }
 
-static brume_result work_gbuffer(struct run *run, uint32_t sample)
+static brume_result work_gbuffer(struct run *run)
 {
-    struct renderer *renderer = run->renderer;
-    return view_gbuffer(run->gpu, &renderer->targets, &renderer->geometry, &run->request->view,
-                        sample);
+    struct render_request *request = run->request;
+    return view_gbuffer(run->gpu, request->targets, &run->renderer->geometry, &request->view,
+                        request->sample);
 }
 
-static brume_result work_shade(struct run *run, uint32_t sample)
+static int rows_to_do(const struct run *run)
 {
-    struct renderer *renderer = run->renderer;
-    view_frame(&run->request->view, sample, &renderer->frame);
-    TRY(bind_frame(run));
-    return view_shade(run->gpu, &renderer->targets, &run->request->view);
+    const vec4 march = run->renderer->frame.march;
+    return (int)(march.w - march.z);
 }
 
-static brume_result work_march(struct run *run, uint32_t sample)
+static brume_result work_shade(struct run *run)
 {
-    struct renderer *renderer = run->renderer;
-    (void)sample;
-    return view_march(run->gpu, &renderer->targets, &run->request->view, &renderer->frame,
-                      &renderer->frame_block, run->request->control);
+    return view_shade(run->gpu, &run->request->view, rows_to_do(run));
+}
+
+static brume_result work_march(struct run *run)
+{
+    return view_march(run->gpu, &run->request->view, rows_to_do(run));
 }
 
 /* Reads the mean of the samples so far and makes it the newest picture. */
-static brume_result work_passes(struct run *run, uint32_t sample)
+static brume_result work_passes(struct run *run)
 {
     struct render_request *request = run->request;
     struct picture *back = &request->back;
+    if (!back->pixels[BRUME_PASS_COMBINED])
+        TRY(picture_init(back, &request->view));
     for (uint32_t pass = 0; pass < BRUME_PASS_COUNT; ++pass)
         if (back->pixels[pass])
-            TRY(view_read(&run->renderer->targets, &request->view, pass, sample + 1,
+            TRY(view_read(request->targets, &request->view, pass, request->sample,
                           back->pixels[pass]));
-    back->samples = sample + 1;
+    back->samples = request->sample;
     pthread_mutex_lock(&request->control->mutex);
     const struct picture newest = *back;
     *back = *request->front;
@@ -277,36 +282,64 @@ static brume_result work_passes(struct run *run, uint32_t sample)
     return context_check("reading the picture");
 }
 
-static brume_result run_view(struct run *run)
+/* The last row of this step, and one. */
+static int last_row(const struct run *run)
+{
+    const brume_view *view = &run->request->view;
+    if (!run->gpu->context.info.software)
+        return view->height;
+    const int groups = SOFTWARE_PIXELS / view->width / GROUP_PIXELS;
+    const int end = run->request->row + (groups ? groups : 1) * GROUP_PIXELS;
+    return end < view->height ? end : view->height;
+}
+
+/* All of the context's state that a sample needs: another job may have had its step before. */
+static brume_result bind_view(struct run *run, int end)
 {
     struct renderer *renderer = run->renderer;
-    struct render_request *request = run->request;
-    const brume_view *view = &request->view;
-    TRY(view_begin(run->gpu, &renderer->targets, view));
-    set_world(run);
+    const struct render_request *request = run->request;
     const float cell = renderer->medium.dims[0] ? renderer->medium.cell : 1.0f;
-    renderer->frame.march = (vec4){cell * request->settings.step, FOG_STEPS, 0.0f, 0.0f};
+    set_world(run);
+    renderer->frame.march = (vec4){cell * request->settings.step, FOG_STEPS, (float)request->row,
+                                   (float)end};
+    view_frame(&request->view, request->sample, &renderer->frame);
     medium_textures_bind(&renderer->medium);
     shadows_bind(&renderer->shadows);
     transport_bind(&renderer->transport);
-    double next_picture = 0.0; /* the first sample at once */
-    for (uint32_t sample = 0; sample < view->samples; ++sample) {
-        TRY(stage_timed(run, BRUME_STAGE_GBUFFER, sample, work_gbuffer));
-        TRY(stage_timed(run, BRUME_STAGE_SHADE, sample, work_shade));
-        TRY(stage_timed(run, BRUME_STAGE_MARCH, sample, work_march));
-        pthread_mutex_lock(&request->control->mutex);
-        request->control->samples_done = sample + 1;
-        pthread_mutex_unlock(&request->control->mutex);
-        if (view->progressive && sample + 1 < view->samples && clock_ms() > next_picture) {
-            TRY(stage_timed(run, BRUME_STAGE_PASSES, sample, work_passes));
-            next_picture = clock_ms() + PICTURE_MS;
-        }
-    }
-    for (int stage = BRUME_STAGE_GBUFFER; stage < BRUME_STAGE_COUNT; ++stage) {
-        ++renderer->stages[stage].runs;
-        ++renderer->stages[stage].revision;
-    }
-    return stage_timed(run, BRUME_STAGE_PASSES, view->samples - 1, work_passes);
+    view_bind(request->targets);
+    return bind_frame(run);
+}
+
+static void count_sample(struct render_request *request)
+{
+    request->row = 0;
+    ++request->sample;
+    pthread_mutex_lock(&request->control->mutex);
+    request->control->samples_done = request->sample;
+    pthread_mutex_unlock(&request->control->mutex);
+}
+
+static brume_result step_view(struct run *run, bool *more)
+{
+    struct render_request *request = run->request;
+    const brume_view *view = &request->view;
+    if (request->row == 0)
+        TRY(stage_timed(run, BRUME_STAGE_GBUFFER, work_gbuffer));
+    const int end = last_row(run);
+    TRY(bind_view(run, end));
+    TRY(stage_timed(run, BRUME_STAGE_SHADE, work_shade));
+    TRY(stage_timed(run, BRUME_STAGE_MARCH, work_march));
+    request->row = end;
+    *more = true;
+    if (end < view->height)
+        return BRUME_OK;
+    count_sample(request);
+    *more = request->sample < view->samples;
+    if (*more && !(view->progressive && clock_ms() > request->next_picture))
+        return BRUME_OK;
+    const brume_result result = stage_timed(run, BRUME_STAGE_PASSES, work_passes);
+    request->next_picture = clock_ms() + PICTURE_MS; /* the first sample was at once */
+    return result;
 }
 
 /* --- The budget --------------------------------------------------------------------------- */
@@ -328,9 +361,11 @@ static uint64_t product_bytes(const struct renderer *renderer)
 static brume_result share_budget(struct run *run)
 {
     struct renderer *renderer = run->renderer;
-    const uint64_t budget = run->request->settings.memory_budget;
-    const uint64_t taken = view_bytes(&run->request->view) +
-                           geometry_bytes(run->request->snapshot) + FIXED_BYTES;
+    struct render_request *request = run->request;
+    const uint64_t budget = request->settings.memory_budget;
+    const uint64_t pictures = view_pool_bytes(renderer->targets, true) +
+                              (request->targets ? 0 : view_bytes(&request->view));
+    const uint64_t taken = pictures + geometry_bytes(request->snapshot) + FIXED_BYTES;
     if (taken >= budget)
         return fail(BRUME_E_MEMORY,
                     "picture, meshes and images alone need %.1f MiB of graphics memory; the "
@@ -339,7 +374,8 @@ static brume_result share_budget(struct run *run)
     const uint64_t rest = budget - taken;
     renderer->shares = (struct shares){
         .medium = rest / 4, .shadow = rest / 8 * 3, .depth = rest / 4, .sky = rest / 8};
-    view_forget(run->gpu, &renderer->targets, &run->request->view);
+    if (product_bytes(renderer) + view_pool_bytes(renderer->targets, false) > rest)
+        view_pool_trim(run->gpu, &renderer->targets);
     if (product_bytes(renderer) > rest) {
         medium_textures_finish(run->gpu, &renderer->medium);
         shadows_finish(run->gpu, &renderer->shadows);
@@ -362,7 +398,7 @@ static uint64_t cube(int32_t side)
 
 /* --- All of it ---------------------------------------------------------------------------- */
 
-static void fill_stats(struct run *run, double started)
+static void fill_stats(struct run *run)
 {
     brume_stats *stats = &run->request->stats;
     const struct renderer *renderer = run->renderer;
@@ -371,7 +407,6 @@ static void fill_stats(struct run *run, double started)
         stats->stages[stage].runs = renderer->stages[stage].runs;
         stats->stages[stage].revision = renderer->stages[stage].revision;
     }
-    stats->total_ms = clock_ms() - started;
     stats->medium_bytes = memory->bytes[FOR_MEDIUM];
     stats->transport_bytes = memory->bytes[FOR_TRANSPORT];
     stats->shadow_bytes = memory->bytes[FOR_SHADOW];
@@ -379,24 +414,48 @@ static void fill_stats(struct run *run, double started)
     stats->image_bytes = memory->bytes[FOR_IMAGE];
     stats->target_bytes = memory->bytes[FOR_TARGET];
     stats->total_bytes = memory->total;
-    stats->peak_bytes = memory->peak;
     memcpy(stats->medium_dims, renderer->medium.dims, sizeof stats->medium_dims);
     memcpy(stats->transport_dims, &renderer->frame.lattice_dims, sizeof stats->transport_dims);
     stats->light_count = renderer->shadows.light_count;
     stats->triangle_count = renderer->geometry.triangle_count;
-    stats->samples = run->request->view.samples;
+    stats->samples = run->request->sample;
 }
 
+/* The warnings of the products that the job now uses, once each. */
+static void collect_warnings(struct run *run)
+{
+    struct render_request *request = run->request;
+    struct job_control *control = request->control;
+    const struct stage_record *stages = run->renderer->stages;
+    uint64_t revisions[BRUME_STAGE_TRANSPORT + 1];
+    for (int stage = 0; stage <= BRUME_STAGE_TRANSPORT; ++stage)
+        revisions[stage] = stages[stage].revision;
+    const uint64_t products = signature(revisions, BRUME_STAGE_TRANSPORT + 1);
+    if (products == request->products)
+        return;
+    request->products = products;
+    pthread_mutex_lock(&control->mutex);
+    control->warning_count = 0;
+    pthread_mutex_unlock(&control->mutex);
+    for (int stage = 0; stage <= BRUME_STAGE_TRANSPORT; ++stage)
+        for (uint32_t i = 0; i < stages[stage].warning_count; ++i)
+            job_warn_again(control, &stages[stage].warnings[i]);
+}
+
+/* What the view takes its light from: signatures alone where nothing changed since, be it by another
+ * request's step. */
 static brume_result run_stages(struct run *run)
 {
     struct renderer *renderer = run->renderer;
-    const struct render_request *request = run->request;
+    struct render_request *request = run->request;
     const struct snapshot *snapshot = request->snapshot;
     const brume_settings *settings = &request->settings;
     const struct stage_record *stages = renderer->stages;
     const struct shares *shares = &renderer->shares;
     TRY(share_budget(run));
     run->gpu->memory.peak = run->gpu->memory.total;
+    if (!request->targets)
+        TRY(view_take(run->gpu, &renderer->targets, &request->view, &request->targets));
 
     /* A share counts as an input only where it is less than what could be used: another picture's
      * size then does not re-run what fits anyway. */
@@ -427,16 +486,36 @@ static brume_result run_stages(struct run *run)
                                   least(shares->sky, lattice_sky_bytes(settings)),
                                   float_bits(snapshot->world.reach)};
     TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 7, work_transport));
-    return run_view(run);
+    collect_warnings(run);
+    return BRUME_OK;
 }
 
-brume_result renderer_run(struct gpu *gpu, struct renderer *renderer,
-                          struct render_request *request)
+brume_result renderer_step(struct gpu *gpu, struct renderer *renderer,
+                           struct render_request *request, bool *more)
 {
     struct run run = {gpu, renderer, request};
     const double started = clock_ms();
-    const brume_result result = run_stages(&run);
-    fill_stats(&run, started); /* of a job that failed, too */
+    *more = false;
+    brume_result result = BRUME_OK;
+    if (job_cancelled(request->control))
+        result = fail(BRUME_E_CANCELLED, "cancelled");
+    if (result == BRUME_OK)
+        result = run_stages(&run);
+    if (result == BRUME_OK)
+        result = step_view(&run, more);
+    request->stats.total_ms += clock_ms() - started;
+    if (request->stats.peak_bytes < gpu->memory.peak)
+        request->stats.peak_bytes = gpu->memory.peak;
+    *more = *more && result == BRUME_OK;
+    if (!*more) {
+        if (result == BRUME_OK)
+            for (int stage = BRUME_STAGE_GBUFFER; stage < BRUME_STAGE_COUNT; ++stage) {
+                ++renderer->stages[stage].runs;
+                ++renderer->stages[stage].revision;
+            }
+        fill_stats(&run); /* of a job that failed, too */
+        view_give_back(gpu, &renderer->targets, request->targets);
+    }
     return result;
 }
 
@@ -448,7 +527,7 @@ void renderer_finish(struct gpu *gpu, struct renderer *renderer)
         free(renderer->stages[stage].warnings);
     shadows_finish(gpu, &renderer->shadows);
     transport_finish(gpu, &renderer->transport);
-    view_finish(gpu, &renderer->targets);
+    view_pool_trim(gpu, &renderer->targets); /* all of them: its jobs have ended */
     buffer_finish(&gpu->memory, &renderer->frame_block);
     memset(renderer, 0, sizeof *renderer);
 }

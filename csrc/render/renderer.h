@@ -28,7 +28,7 @@ struct renderer {
     struct medium_textures medium;
     struct shadows shadows;
     struct transport transport;
-    struct view_targets targets;
+    struct view_targets *targets; /* the pool of its jobs' */
     struct gpu_frame frame;
     struct buffer frame_block;
     int tau_size[3];
@@ -45,10 +45,19 @@ struct render_request {
     struct picture *front; /* the newest whole picture, guarded by the control's mutex */
     struct picture back;   /* the next one; owned by whoever made the request */
     brume_stats stats;
+    /* How far it is. */
+    struct view_targets *targets; /* from the first step to the last */
+    uint32_t sample;
+    int row;
+    uint64_t products;   /* of the scene's stages, as its warnings tell of them */
+    double next_picture;
 };
 
-brume_result renderer_run(struct gpu *gpu, struct renderer *renderer,
-                          struct render_request *request);
+/* Renders a sample, or as many of its rows as a CPU does in a moment; what the scene's stages lack
+ * for it comes first. *more: there is more to do, and the result is BRUME_OK. Other requests may take
+ * steps in between. */
+brume_result renderer_step(struct gpu *gpu, struct renderer *renderer,
+                           struct render_request *request, bool *more);
 void renderer_finish(struct gpu *gpu, struct renderer *renderer);
 
 #endif

@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rows of one dispatch on a CPU: a tenth of a second or so. */
-#define SOFTWARE_ROWS 64
+/* Of a pool, so that the views of a quad view need not make theirs again each time. */
+#define IDLE_MAX 4
 
 static int is_orthographic(const brume_view *view)
 {
@@ -119,14 +119,39 @@ uint64_t view_bytes(const brume_view *view)
            accumulation_bytes(view);
 }
 
-void view_forget(struct gpu *gpu, struct view_targets *targets, const brume_view *view)
+static uint64_t held_bytes(const struct view_targets *targets)
 {
-    if (targets->normal.width != view->width || targets->normal.height != view->height ||
-        targets->accumulation.bytes != accumulation_bytes(view))
-        view_finish(gpu, targets);
+    return targets->normal.bytes + targets->diffuse.bytes + targets->specular.bytes +
+           targets->emission.bytes + targets->tint.bytes + targets->depth.bytes +
+           targets->surface.bytes + targets->accumulation.bytes;
 }
 
-brume_result view_begin(struct gpu *gpu, struct view_targets *targets, const brume_view *view)
+uint64_t view_pool_bytes(const struct view_targets *pool, bool busy)
+{
+    uint64_t bytes = 0;
+    for (; pool; pool = pool->next)
+        if (pool->busy == busy)
+            bytes += held_bytes(pool);
+    return bytes;
+}
+
+static void destroy(struct gpu *gpu, struct view_targets *targets)
+{
+    struct memory *memory = &gpu->memory;
+    texture_finish(memory, &targets->normal);
+    texture_finish(memory, &targets->diffuse);
+    texture_finish(memory, &targets->specular);
+    texture_finish(memory, &targets->emission);
+    texture_finish(memory, &targets->tint);
+    texture_finish(memory, &targets->depth);
+    texture_finish(memory, &targets->surface);
+    buffer_finish(memory, &targets->accumulation);
+    glDeleteFramebuffers(1, &targets->framebuffer);
+    glDeleteFramebuffers(1, &targets->tint_framebuffer);
+    free(targets);
+}
+
+static brume_result create(struct gpu *gpu, struct view_targets *targets, const brume_view *view)
 {
     struct {
         struct texture *texture;
@@ -141,13 +166,11 @@ brume_result view_begin(struct gpu *gpu, struct view_targets *targets, const bru
         {&targets->depth, GL_DEPTH_COMPONENT32F, GL_DEPTH_ATTACHMENT, "depth"},
         {&targets->surface, GL_RGBA32F, GL_NONE, "surface radiance"},
     };
-    if (!targets->framebuffer) {
-        glCreateFramebuffers(1, &targets->framebuffer);
-        glCreateFramebuffers(1, &targets->tint_framebuffer);
-    }
+    glCreateFramebuffers(1, &targets->framebuffer);
+    glCreateFramebuffers(1, &targets->tint_framebuffer);
     for (size_t i = 0; i < sizeof list / sizeof *list; ++i) {
-        TRY(texture_ensure(&gpu->memory, list[i].texture, FOR_TARGET, GL_TEXTURE_2D, list[i].format,
-                           view->width, view->height, 1, 1, list[i].label));
+        TRY(texture_init(&gpu->memory, list[i].texture, FOR_TARGET, GL_TEXTURE_2D, list[i].format,
+                         view->width, view->height, 1, 1, list[i].label));
         if (list[i].attachment != GL_NONE)
             glNamedFramebufferTexture(targets->framebuffer, list[i].attachment,
                                       list[i].texture->id, 0);
@@ -161,14 +184,65 @@ brume_result view_begin(struct gpu *gpu, struct view_targets *targets, const bru
         GL_FRAMEBUFFER_COMPLETE)
         return fail(BRUME_E_GPU, "the driver refuses a %d x %d framebuffer", view->width,
                     view->height);
-    const uint64_t bytes = accumulation_bytes(view);
-    if (targets->accumulation.bytes != bytes) {
-        buffer_finish(&gpu->memory, &targets->accumulation);
-        TRY(buffer_init(&gpu->memory, &targets->accumulation, FOR_TARGET, bytes, NULL,
-                        "accumulation"));
+    return buffer_init(&gpu->memory, &targets->accumulation, FOR_TARGET, accumulation_bytes(view),
+                       NULL, "accumulation");
+}
+
+static bool fits(const struct view_targets *targets, const brume_view *view)
+{
+    return targets->normal.width == view->width && targets->normal.height == view->height &&
+           targets->accumulation.bytes == accumulation_bytes(view);
+}
+
+brume_result view_take(struct gpu *gpu, struct view_targets **pool, const brume_view *view,
+                       struct view_targets **out)
+{
+    struct view_targets *targets = *pool;
+    while (targets && (targets->busy || !fits(targets, view)))
+        targets = targets->next;
+    if (!targets) {
+        view_pool_trim(gpu, pool);
+        targets = calloc(1, sizeof *targets);
+        if (!targets)
+            return fail(BRUME_E_MEMORY, "no memory for a view's targets");
+        const brume_result result = create(gpu, targets, view);
+        if (result != BRUME_OK) {
+            destroy(gpu, targets);
+            return result;
+        }
+        targets->next = *pool;
+        *pool = targets;
     }
+    targets->busy = true;
     glClearNamedBufferData(targets->accumulation.id, GL_R32F, GL_RED, GL_FLOAT, NULL);
+    *out = targets;
     return BRUME_OK;
+}
+
+/* Frees the idle ones but the first `kept`. */
+static void trim(struct gpu *gpu, struct view_targets **pool, int kept)
+{
+    while (*pool) {
+        struct view_targets *targets = *pool;
+        if (targets->busy || kept-- > 0) {
+            pool = &targets->next;
+        } else {
+            *pool = targets->next;
+            destroy(gpu, targets);
+        }
+    }
+}
+
+void view_give_back(struct gpu *gpu, struct view_targets **pool, struct view_targets *targets)
+{
+    if (targets)
+        targets->busy = false;
+    trim(gpu, pool, IDLE_MAX);
+}
+
+void view_pool_trim(struct gpu *gpu, struct view_targets **pool)
+{
+    trim(gpu, pool, 0);
 }
 
 brume_result view_gbuffer(struct gpu *gpu, struct view_targets *targets, struct geometry *geometry,
@@ -186,44 +260,35 @@ brume_result view_gbuffer(struct gpu *gpu, struct view_targets *targets, struct 
     glClearNamedFramebufferfv(targets->tint_framebuffer, GL_COLOR, 0, white);
     TRY(geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_CAMERA, GEOMETRY_TINT));
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    return BRUME_OK;
+}
+
+void view_bind(const struct view_targets *targets)
+{
     glBindTextureUnit(SLOT_GBUFFER_NORMAL, targets->normal.id);
     glBindTextureUnit(SLOT_GBUFFER_DIFFUSE, targets->diffuse.id);
     glBindTextureUnit(SLOT_GBUFFER_SPECULAR, targets->specular.id);
     glBindTextureUnit(SLOT_GBUFFER_EMISSION, targets->emission.id);
     glBindTextureUnit(SLOT_GBUFFER_TINT, targets->tint.id);
-    return BRUME_OK;
+    glBindTextureUnit(SLOT_SURFACE, targets->surface.id);
+    glBindImageTexture(SLOT_OUTPUT, targets->surface.id, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ACCUMULATION, targets->accumulation.id);
 }
 
-brume_result view_shade(struct gpu *gpu, struct view_targets *targets, const brume_view *view)
+brume_result view_shade(struct gpu *gpu, const brume_view *view, int rows)
 {
     const struct program *program;
     TRY(program_compute(&gpu->programs, "shade", &program));
-    glBindImageTexture(SLOT_OUTPUT, targets->surface.id, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-    program_dispatch(program, view->width, view->height, 1);
+    program_dispatch(program, view->width, rows, 1);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     return BRUME_OK;
 }
 
-brume_result view_march(struct gpu *gpu, struct view_targets *targets, const brume_view *view,
-                        struct gpu_frame *frame, struct buffer *frame_block,
-                        struct job_control *control)
+brume_result view_march(struct gpu *gpu, const brume_view *view, int rows)
 {
     const struct program *program;
     TRY(program_compute(&gpu->programs, "march", &program));
-    glBindTextureUnit(SLOT_SURFACE, targets->surface.id);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ACCUMULATION, targets->accumulation.id);
-    const int rows = gpu->context.info.software ? SOFTWARE_ROWS : view->height;
-    for (int y = 0; y < view->height; y += rows) {
-        const int end = y + rows < view->height ? y + rows : view->height;
-        if (job_cancelled(control))
-            return fail(BRUME_E_CANCELLED, "cancelled");
-        frame->march.z = (float)y;
-        frame->march.w = (float)end;
-        TRY(buffer_update(&gpu->memory, frame_block, FOR_TARGET, sizeof *frame, frame, "frame"));
-        program_dispatch(program, view->width, end - y, 1);
-        if (rows < view->height)
-            glFinish();
-    }
+    program_dispatch(program, view->width, rows, 1);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     return BRUME_OK;
 }
@@ -271,22 +336,4 @@ brume_result view_read(struct view_targets *targets, const brume_view *view, uin
             pixels[i * channels + c] = sums[4 * i + c] * scale;
     free(sums);
     return BRUME_OK;
-}
-
-void view_finish(struct gpu *gpu, struct view_targets *targets)
-{
-    struct memory *memory = &gpu->memory;
-    texture_finish(memory, &targets->normal);
-    texture_finish(memory, &targets->diffuse);
-    texture_finish(memory, &targets->specular);
-    texture_finish(memory, &targets->emission);
-    texture_finish(memory, &targets->tint);
-    texture_finish(memory, &targets->depth);
-    texture_finish(memory, &targets->surface);
-    buffer_finish(memory, &targets->accumulation);
-    if (targets->framebuffer) {
-        glDeleteFramebuffers(1, &targets->framebuffer);
-        glDeleteFramebuffers(1, &targets->tint_framebuffer);
-    }
-    memset(targets, 0, sizeof *targets);
 }

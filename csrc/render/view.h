@@ -5,10 +5,13 @@
 
 #include "render/geometry.h"
 
+/* What a job draws into, from its first sample to its last. */
 struct view_targets {
     struct texture normal, diffuse, specular, emission, tint, depth, surface;
     struct buffer accumulation;
     GLuint framebuffer, tint_framebuffer;
+    bool busy;                 /* a job's; others are free to take */
+    struct view_targets *next; /* of the pool */
 };
 
 /* Bytes of a pixel: five attachments, depth, the surfaces' radiance, and a vec4 a pass. */
@@ -16,20 +19,26 @@ struct view_targets {
 #define VIEW_PASS_PIXEL_BYTES 16
 
 uint64_t view_bytes(const brume_view *view);
-/* Frees targets that are not of this view's size, before anything else takes their memory. */
-void view_forget(struct gpu *gpu, struct view_targets *targets, const brume_view *view);
+/* Bytes of the pool's targets: of those that jobs hold, or of the idle ones. */
+uint64_t view_pool_bytes(const struct view_targets *pool, bool busy);
+/* Cleared targets of this view's size: idle ones, or new ones after all idle ones are freed. */
+brume_result view_take(struct gpu *gpu, struct view_targets **pool, const brume_view *view,
+                       struct view_targets **out);
+/* Makes them idle; a few are kept. NULL is fine. */
+void view_give_back(struct gpu *gpu, struct view_targets **pool, struct view_targets *targets);
+/* Frees the idle ones. */
+void view_pool_trim(struct gpu *gpu, struct view_targets **pool);
 
 /* The camera's part of the frame's block, for one sample of a pixel. */
 void view_frame(const brume_view *view, uint32_t sample, struct gpu_frame *frame);
 
-brume_result view_begin(struct gpu *gpu, struct view_targets *targets, const brume_view *view);
 brume_result view_gbuffer(struct gpu *gpu, struct view_targets *targets, struct geometry *geometry,
                           const brume_view *view, uint32_t sample);
-brume_result view_shade(struct gpu *gpu, struct view_targets *targets, const brume_view *view);
-/* In bands of rows on a CPU, so that a cancel comes through; the band stands in the frame. */
-brume_result view_march(struct gpu *gpu, struct view_targets *targets, const brume_view *view,
-                        struct gpu_frame *frame, struct buffer *frame_block,
-                        struct job_control *control);
+/* For the two below, once the G-buffer is drawn; they do the rows that stand in the frame. */
+void view_bind(const struct view_targets *targets);
+brume_result view_shade(struct gpu *gpu, const brume_view *view, int rows);
+brume_result view_march(struct gpu *gpu, const brume_view *view, int rows);
+
 /* The passes as floats in main memory. */
 struct picture {
     float *pixels[BRUME_PASS_COUNT]; /* width * height * channels; NULL: not wanted */
@@ -42,6 +51,5 @@ void picture_finish(struct picture *picture);
 /* The mean over the samples of one pass, pixels * channels floats. */
 brume_result view_read(struct view_targets *targets, const brume_view *view, uint32_t pass,
                        uint32_t samples, float *pixels);
-void view_finish(struct gpu *gpu, struct view_targets *targets);
 
 #endif

@@ -64,10 +64,8 @@ static brume_view noisy_view(uint32_t seed)
 }
 
 /* All passes, one after the other. */
-static float *picture(brume_scene *scene, uint32_t seed, size_t *bytes)
+static float *all_passes(brume_job *job, size_t *bytes)
 {
-    const brume_view view = noisy_view(seed);
-    brume_job *job = render(scene, &settings, &view);
     float *all = malloc(PIXELS * PIXELS * 4 * BRUME_PASS_COUNT * sizeof *all);
     assert_non_null(all);
     size_t floats = 0;
@@ -78,8 +76,16 @@ static float *picture(brume_scene *scene, uint32_t seed, size_t *bytes)
             assert_true(isfinite(all[i]));
         floats += count;
     }
-    brume_job_release(job);
     *bytes = floats * sizeof *all;
+    return all;
+}
+
+static float *picture(brume_scene *scene, uint32_t seed, size_t *bytes)
+{
+    const brume_view view = noisy_view(seed);
+    brume_job *job = render(scene, &settings, &view);
+    float *all = all_passes(job, bytes);
+    brume_job_release(job);
     return all;
 }
 
@@ -168,12 +174,58 @@ static void edits_do_not_reach_queued_jobs(void **state)
     brume_scene_destroy(scene);
 }
 
+/* Jobs that take turns do not touch each other's pictures: of one scene with the same products, of
+ * one scene with settings that undo them at every turn, of two scenes. */
+static void jobs_beside_one_another(void **state)
+{
+    (void)state;
+    enum { JOBS = 4 };
+    brume_scene *first = noisy_scene(0), *second = noisy_scene(1);
+    assert_ok(brume_scene_remove(second, BRUME_KIND_LIGHT, 2));
+    brume_scene *const scenes[JOBS] = {first, first, first, second};
+    brume_settings all_settings[JOBS] = {settings, settings, settings, settings};
+    all_settings[2].shadow_resolution = 48;
+    all_settings[2].medium_resolution = 9;
+    brume_view views[JOBS];
+    brume_job *jobs[JOBS];
+    float *alone[JOBS];
+    size_t bytes;
+    for (int i = 0; i < JOBS; ++i) {
+        views[i] = noisy_view(i == 1 ? 4 : 3);
+        brume_job *job = render(scenes[i], &all_settings[i], &views[i]);
+        alone[i] = all_passes(job, &bytes);
+        brume_job_release(job);
+        for (int before = 0; before < i; ++before)
+            assert_memory_not_equal(alone[i], alone[before], bytes);
+    }
+    for (int i = 0; i < JOBS; ++i)
+        assert_ok(brume_render(scenes[i], &all_settings[i], &views[i], &jobs[i]));
+    brume_job_status status;
+    do
+        assert_ok(brume_job_wait(jobs[JOBS - 1], 1, &status));
+    while (status.samples_done == 0);
+    assert_ok(brume_job_poll(jobs[0], &status));
+    assert_int_equal(status.state, BRUME_JOB_RUNNING); /* or else none had turns */
+    for (int i = 0; i < JOBS; ++i) {
+        assert_ok(brume_job_wait(jobs[i], -1, &status));
+        assert_int_equal(status.state, BRUME_JOB_DONE);
+        float *beside = all_passes(jobs[i], &bytes);
+        assert_memory_equal(beside, alone[i], bytes);
+        free(beside);
+        free(alone[i]);
+        brume_job_release(jobs[i]);
+    }
+    brume_scene_destroy(first);
+    brume_scene_destroy(second);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(same_scene_same_pixels),
         cmocka_unit_test(history_leaves_no_trace),
         cmocka_unit_test(edits_do_not_reach_queued_jobs),
+        cmocka_unit_test(jobs_beside_one_another),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

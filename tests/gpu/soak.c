@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* 200 renders in a row through the public interface: no GL error, and memory stays where it was
- * once drivers and allocators have warmed up. */
+/* 200 renders in a row through the public interface, and 500 jobs of two scenes, some cancelled: no GL
+ * error, and memory stays where it was once drivers and allocators have warmed up. */
 #include "brume.h"
 
 #include <setjmp.h>
@@ -171,8 +171,83 @@ static void memory_stays_flat_and_no_gl_error(void **state)
     brume_device_destroy(device);
 }
 
+/* A few of both scenes' jobs are under way at any time; some are cancelled or dropped at once, some
+ * after a while, some never. Sizes, urgency and the scenes change from job to job. */
+static void crowds_and_cancels(void **state)
+{
+    enum { JOBS = 500, TOGETHER = 6, WARM_JOBS = 150 };
+    const brume_settings settings = {.medium_resolution = 12, .lattice_resolution = 6,
+                                     .shadow_resolution = 32, .light_samples = 2,
+                                     .world_samples = 4};
+    const brume_device_params params = {
+        .shader_dir = TEST_SHADERS, .log = count_complaints, .debug = 1};
+    brume_device *device = NULL;
+    brume_scene *scenes[2];
+    brume_job *jobs[TOGETHER] = {NULL};
+    int cancelled[TOGETHER] = {0}, done = 0;
+    uint32_t lot = 1;
+    long warm = 0;
+
+    (void)state;
+    assert_int_equal(brume_device_create(&params, &device), BRUME_OK);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(brume_scene_create(device, &scenes[i]), BRUME_OK);
+        set_sun(scenes[i]);
+        set_fog(scenes[i], 0);
+    }
+    for (int i = 0; i < JOBS + TOGETHER; i++) {
+        const int place = i % TOGETHER;
+        lot = lot * 1664525u + 1013904223u;
+        const uint32_t chance = lot >> 24;
+        if (jobs[place]) {
+            brume_job_status status;
+            assert_int_equal(brume_job_wait(jobs[place], -1, &status), BRUME_OK);
+            if (status.state != BRUME_JOB_DONE && !cancelled[place])
+                fail_msg("state %u: %s", status.state, brume_job_error(jobs[place]));
+            done += status.state == BRUME_JOB_DONE;
+            brume_job_release(jobs[place]);
+            jobs[place] = NULL;
+        }
+        if (i + 1 == WARM_JOBS)
+            warm = resident_kib();
+        if (i >= JOBS)
+            continue;
+        brume_view view = fog_view();
+        view.width >>= 1 + chance % 3;
+        view.height >>= 1 + chance % 3;
+        view.urgent = chance % 5 == 0;
+        view.progressive = chance % 2;
+        if (chance % 8 == 0)
+            set_fog(scenes[i % 2], i % 7);
+        assert_int_equal(brume_render(scenes[i % 2], &settings, &view, &jobs[place]), BRUME_OK);
+        cancelled[place] = chance < 40;
+        if (chance < 40)
+            brume_job_cancel(jobs[place]);
+        if (chance >= 40 && chance < 80) { /* one that may have begun */
+            const int next = (place + 1) % TOGETHER;
+            cancelled[next] = 1;
+            brume_job_cancel(jobs[next]);
+        }
+        if (chance > 245) {
+            brume_job_release(jobs[place]);
+            jobs[place] = NULL;
+        }
+    }
+    const long grown = resident_kib() - warm;
+    print_message("%d of %d jobs done; resident memory: %ld KiB warm, %+ld KiB after\n", done, JOBS,
+                  warm, grown);
+    assert_true(done > JOBS / 4 && done < JOBS);
+    assert_true(grown < GROWTH_KIB_MAX);
+    assert_int_equal(atomic_load(&complaints), 0);
+    brume_scene_destroy(scenes[0]);
+    brume_scene_destroy(scenes[1]);
+    brume_device_destroy(device);
+    assert_int_equal(atomic_load(&complaints), 0); /* bytes not freed, say */
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(memory_stays_flat_and_no_gl_error)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(memory_stays_flat_and_no_gl_error),
+                                       cmocka_unit_test(crowds_and_cancels)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

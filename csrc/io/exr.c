@@ -17,6 +17,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* The initializers that OpenEXR 3.4 has for its pipelines name the first fields only. */
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+
 /* 4 GiB of RGBA floats: beyond any picture or environment that Brume is meant for. */
 #define MOST_PIXELS (UINT64_C(1) << 28)
 

@@ -23,11 +23,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+/* The initializers that OpenEXR 3.4 has for its pipelines name the first fields only. */
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+
 static char folder[64];
 
 static const char *in_folder(const char *name)
 {
-    static char path[4][160];
+    static char path[4][sizeof folder + 256]; /* 255: the longest name in a folder */
     static int turn;
     turn = (turn + 1) % 4;
     snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);

@@ -4,8 +4,10 @@
 import math
 import os
 import subprocess
+import sys
 from pathlib import Path
 
+import blenders
 import bpy
 import numpy as np
 import pytest
@@ -13,6 +15,10 @@ from brume import native
 from brume.export.target import Target
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+def pytest_collection_modifyitems(config, items):
+    blenders.deselect(config, items, bpy.app.version, sys.version_info)
 
 
 class Recorder:
@@ -52,7 +58,8 @@ class Nodes:
     Inputs are named by identifier with _ for blanks."""
 
     def __init__(self, owner):
-        owner.use_nodes = True
+        if owner.node_tree is None:  # until 5.0
+            owner.use_nodes = True
         self.tree = owner.node_tree
         self.tree.nodes.clear()
         kind = {"Material": "Material", "World": "World"}.get(type(owner).__name__, "Light")
@@ -61,7 +68,8 @@ class Nodes:
     def node(self, name, outlet=0, **values):
         node = self.tree.nodes.new(f"ShaderNode{name}")
         for key, value in values.items():
-            socket = next((s for s in node.inputs if s.identifier.replace(" ", "_") == key), None)
+            sockets = {s.identifier.replace(" ", "_"): s for s in node.inputs}
+            socket = sockets.get(key) or sockets.get(blenders.RENAMED.get(key))
             if socket is None:
                 setattr(node, key, value)
             elif isinstance(value, bpy.types.NodeSocket):
@@ -142,7 +150,7 @@ def cube(name="Cube", size=2.0, material=None, **more):
 
 def write_vdb(path, **grids):
     """Writes arrays (x, y, z) as float grids, or (x, y, z, 3) as vec3 grids, of 0.1 m voxels."""
-    import pyopenvdb as vdb
+    vdb = blenders.vdb
     made = []
     for name, values in grids.items():
         grid = vdb.FloatGrid() if values.ndim == 3 else vdb.Vec3SGrid()

@@ -12,8 +12,8 @@ import subprocess
 
 import bpy
 import numpy as np
-import pyopenvdb as vdb
 import pytest
+from blenders import vdb
 from brume import engine
 from conftest import add, blender, lit, material, write_vdb
 

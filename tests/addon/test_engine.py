@@ -5,11 +5,12 @@ import signal
 import subprocess
 import time
 
+import blenders
 import bpy
 import numpy as np
 import pytest
 from brume import engine, native, properties, session
-from conftest import ROOT, blender, cube, lit
+from conftest import ROOT, Nodes, blender, cube, lit
 
 SIZE = 24, 32  # rows, columns
 
@@ -117,7 +118,8 @@ def test_world_is_drawn(scene, render):
     lit(scene)
     scene.render.film_transparent = False
     scene.world = bpy.data.worlds.new("World")
-    scene.world.color = (0.1, 0.2, 0.3)
+    nodes = Nodes(scene.world)
+    nodes.surface(nodes.node("Background", Color=(0.1, 0.2, 0.3, 1)))
     np.testing.assert_allclose(render()[0, 0], (0.1, 0.2, 0.3, 1.0), rtol=1e-3)
 
 
@@ -127,7 +129,7 @@ def test_passes_reach_the_file(scene, tmp_path):
     layer.use_pass_z = layer.use_pass_normal = True
     layer.use_pass_emit = layer.use_pass_environment = True
     layer.brume.use_pass_volume_direct = layer.brume.use_pass_transmittance = True
-    scene.render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+    blenders.multilayer(scene.render.image_settings)
     scene.render.filepath = str(tmp_path / "layers.exr")
     bpy.ops.render.render(write_still=True)
     names = header_channels(tmp_path / "layers.exr")
@@ -154,7 +156,7 @@ def test_two_view_layers(scene, tmp_path):
     second = scene.view_layers.new("Second")
     second.use_pass_z = True
     scene.view_layers[0].use_pass_z = False
-    scene.render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+    blenders.multilayer(scene.render.image_settings)
     scene.render.filepath = str(tmp_path / "layers.exr")
     bpy.ops.render.render(write_still=True)
     names = header_channels(tmp_path / "layers.exr")
@@ -250,6 +252,7 @@ def test_another_scene_between(scene, render, tmp_path):
     assert np.array_equal(render("b"), whole)
 
 
+@pytest.mark.fluid
 def test_a_simulation_beyond_its_cache(tmp_path):
     """Frame 66 alone is cached: before and after, there is no smoke, and no report."""
     bpy.ops.wm.open_mainfile(filepath=str(ROOT / "blend_scenes" / "plume.blend"))

@@ -108,6 +108,7 @@ def test_no_world_is_black(scene, target, recorder):
     close(recorder.world["color"], 0)
 
 
+@pytest.mark.without_nodes
 def test_world_without_nodes(scene, target, recorder):
     made = bpy.data.worlds.new("World")
     made.color = (0.1, 0.2, 0.3)

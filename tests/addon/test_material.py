@@ -39,6 +39,7 @@ def test_default_is_matt_grey(scene, target, recorder):
     close(block["specular"], 0)
 
 
+@pytest.mark.without_nodes
 def test_without_nodes(scene, target, recorder):
     plain = bpy.data.materials.new("Plain")
     plain.diffuse_color = (0.1, 0.2, 0.3, 1)
@@ -79,6 +80,7 @@ def test_principled_alpha(lobes):
     assert block["alpha_mode"] == 'BLEND'
 
 
+@pytest.mark.blend_method
 def test_alpha_clip(scene, target, recorder):
     owner, nodes = material()
     owner.blend_method, owner.alpha_threshold = 'CLIP', 0.3

@@ -6,6 +6,7 @@ import math
 import bpy
 import numpy as np
 import pytest
+from blenders import auto_smooth
 from brume.export import mesh
 from conftest import add, cube
 
@@ -49,7 +50,7 @@ def test_smooth_cube(scene):
 
 def test_custom_normals(scene):
     ob = cube()
-    ob.data.use_auto_smooth = True
+    auto_smooth(ob.data)
     ob.data.normals_split_custom_set([(0.0, 0.6, 0.8)] * len(ob.data.loops))
     # Blender stores custom normals with 16 bits.
     np.testing.assert_allclose(read(ob)["corner_normals"],
@@ -73,7 +74,8 @@ def test_uvs_survive_smooth_normals(scene):
     """Computing normals moves the mesh's layers in memory; the UVs must be read after it."""
     bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
     ob = bpy.context.object
-    bpy.ops.object.shade_smooth(use_auto_smooth=True)
+    bpy.ops.object.shade_smooth()
+    auto_smooth(ob.data)
     first = read(ob)["corner_uvs"]
     np.testing.assert_array_equal(read(ob)["corner_uvs"], first)
     assert np.unique(first.reshape(-1, 2), axis=0).shape[0] > 64 * 30

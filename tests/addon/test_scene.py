@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 import pytest
+from blenders import interface_socket
 from brume import native
 from brume.export import volume
 from conftest import Nodes, add, cube, material, write_vdb
@@ -149,8 +150,8 @@ def test_particles(scene, export):
 def geometry_nodes(ob, build):
     """Gives an object a geometry nodes modifier; build(tree, input socket) gives the output."""
     tree = bpy.data.node_groups.new("Geometry", 'GeometryNodeTree')
-    tree.inputs.new('NodeSocketGeometry', "Geometry")
-    tree.outputs.new('NodeSocketGeometry', "Geometry")
+    for in_out in ('INPUT', 'OUTPUT'):
+        interface_socket(tree, "Geometry", in_out, 'NodeSocketGeometry')
     enter, leave = tree.nodes.new('NodeGroupInput'), tree.nodes.new('NodeGroupOutput')
     tree.links.new(build(tree, enter.outputs[0]), leave.inputs[0])
     ob.modifiers.new("Geometry", 'NODES').node_group = tree
@@ -353,6 +354,7 @@ def plume(target, recorder):
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
 
 
+@pytest.mark.fluid
 def test_fluid_domain(plume, export, target):
     recorder = export()
     block = recorder.named("volume", plume.name)
@@ -366,6 +368,7 @@ def test_fluid_domain(plume, export, target):
     assert block.get("scale", 1.0) == 1.0
 
 
+@pytest.mark.fluid
 def test_fluid_color_is_not_multiplied_by_density(plume, export):
     nodes = Nodes(plume.material_slots[0].material)
     nodes.volume(nodes.node("VolumePrincipled", Color_Attribute="color", Density=1.0))
@@ -375,6 +378,7 @@ def test_fluid_color_is_not_multiplied_by_density(plume, export):
     assert 0.0 < color.maximum <= 1.01
 
 
+@pytest.mark.fluid
 def test_adaptive_domain_with_noise(scene, tmp_path, monkeypatch, export):
     """The grids of a domain that shrinks around its smoke lie where the smoke's source is."""
     from brume.export import fluid
@@ -460,9 +464,9 @@ def test_material_override(scene, export):
 
 
 def test_what_is_not_shown_is_named(scene, export, target):
-    bpy.ops.object.gpencil_add(type='MONKEY')
+    add("Hair", bpy.data.hair_curves.new("Hair"))
     export()
-    assert any("GPENCIL" in sentence for _, sentence in target.reports)
+    assert any('"Hair"' in sentence and "CURVES" in sentence for _, sentence in target.reports)
 
 
 def test_keys_do_not_depend_on_the_run():

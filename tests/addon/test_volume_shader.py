@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from blenders import interface_socket
 from brume.export import expression, volume_shader
 from brume.native import OPS, REGISTERS, BrumeError
 from conftest import material
@@ -300,8 +301,8 @@ def test_constants_are_folded(scene):
 def test_groups_reroutes_and_muted_nodes(scene):
     import bpy
     group = bpy.data.node_groups.new("Twice", 'ShaderNodeTree')
-    group.inputs.new('NodeSocketFloat', "In")
-    group.outputs.new('NodeSocketFloat', "Out")
+    interface_socket(group, "In", 'INPUT', 'NodeSocketFloat')
+    interface_socket(group, "Out", 'OUTPUT', 'NodeSocketFloat')
     enter, leave = group.nodes.new('NodeGroupInput'), group.nodes.new('NodeGroupOutput')
     double = group.nodes.new('ShaderNodeMath')
     double.operation = 'MULTIPLY'

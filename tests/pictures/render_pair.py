@@ -16,6 +16,7 @@ import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import blenders
 import openexr
 from cases import CASES
 
@@ -43,9 +44,8 @@ def set_up(scene, case):
     render.resolution_percentage = 100
     render.film_transparent = False
     render.use_border = render.use_compositing = render.use_sequencer = False
-    render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+    blenders.multilayer(render.image_settings)
     render.image_settings.exr_codec = 'ZIP'
-    render.image_settings.color_depth = '32'
     case.apply(scene)
 
 

@@ -6,8 +6,8 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
-import pyopenvdb as vdb
 import pytest
+from blenders import vdb
 
 ROOT = Path(__file__).parents[2]
 BUILD = Path(os.environ.get("BRUME_BUILD", ROOT / "build")).resolve()

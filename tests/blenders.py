@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender's versions have in different places for the tests, and what a Blender cannot do."""
+
+try:
+    import openvdb as vdb
+except ImportError:
+    import pyopenvdb as vdb  # until OpenVDB 11
+
+__all__ = ["RENAMED", "auto_smooth", "deselect", "interface_socket", "multilayer", "vdb"]
+
+# Inputs of the Principled BSDF: what 4.0 calls them.
+RENAMED = {"Specular": "Specular_IOR_Level", "Emission": "Emission_Color",
+           "Transmission": "Transmission_Weight"}
+
+
+def unable(blender, python):
+    """Marker of tests -> why this Blender cannot run them, by the versions of Blender and of its
+    Python."""
+    reasons = {}
+    if blender < (5, 0) and python >= (3, 13):
+        reasons["fluid"] = ("a Fluid domain ends Blender: its Mantaflow calls "
+                            "PyImport_AppendInittab() in a running Python, which 3.13 forbids")
+    if blender >= (4, 2):
+        reasons["blend_method"] = "Blender 4.2 took EEVEE's blend methods away"
+    if blender >= (5, 0):
+        reasons["without_nodes"] = "since Blender 5.0 every material and world has nodes"
+    return reasons
+
+
+def deselect(config, items, blender, python):
+    """Leaves out what this Blender cannot do, and says so: a skipped test would count as failed."""
+    reasons = unable(blender, python)
+    kept = []
+    for item in items:
+        marker = next((mark.name for mark in item.iter_markers() if mark.name in reasons), None)
+        if marker is None:
+            kept.append(item)
+            continue
+        config.hook.pytest_deselected(items=[item])
+        print(f"left out: {item.nodeid}: {reasons[marker]}")
+    items[:] = kept
+
+
+def interface_socket(tree, name, in_out, kind):
+    """Gives a node group a socket of a kind such as 'NodeSocketFloat'."""
+    if hasattr(tree, "interface"):  # 4.0
+        tree.interface.new_socket(name, in_out=in_out, socket_type=kind)
+    else:
+        (tree.inputs if in_out == 'INPUT' else tree.outputs).new(kind, name)
+
+
+def auto_smooth(mesh):
+    """Lets custom normals and sharp edges count, as they always do since 4.1."""
+    if hasattr(mesh, "use_auto_smooth"):
+        mesh.use_auto_smooth = True
+
+
+def multilayer(settings):
+    """Sets a scene's image settings to one multi-layer EXR part of floats."""
+    if hasattr(settings, "media_type"):  # 5.0
+        settings.media_type = 'MULTI_LAYER_IMAGE'
+        settings.use_exr_interleave = True
+    settings.file_format, settings.color_depth = 'OPEN_EXR_MULTILAYER', '32'

@@ -14,6 +14,9 @@ from brume.properties import PASSES
 
 def save(path, file_format, color_depth, color_mode):
     settings = bpy.context.scene.render.image_settings
+    if hasattr(settings, "media_type"):  # Blender 5
+        layers = file_format == "OPEN_EXR_MULTILAYER"
+        settings.media_type = "MULTI_LAYER_IMAGE" if layers else "IMAGE"
     settings.file_format = file_format
     settings.color_mode = color_mode
     settings.color_depth = color_depth

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Running the stages. */
 #include "render/renderer.h"
+#include "base/hash.h"
 #include "base/result.h"
 #include "gl/timer.h"
 #include "math/frame.h"
@@ -28,22 +29,9 @@ struct run {
 
 /* --- Signatures: what a stage depends on -------------------------------------------------- */
 
-static uint64_t mix(uint64_t hash, uint64_t value)
-{
-    /* FNV-1a over the bytes */
-    for (int i = 0; i < 8; ++i) {
-        hash ^= (value >> (8 * i)) & 0xff;
-        hash *= 0x100000001b3ull;
-    }
-    return hash;
-}
-
 static uint64_t signature(const uint64_t *values, size_t count)
 {
-    uint64_t hash = 0xcbf29ce484222325ull;
-    for (size_t i = 0; i < count; ++i)
-        hash = mix(hash, values[i]);
-    return hash ? hash : 1;
+    return hash_bytes(HASH_START, values, count * sizeof *values);
 }
 
 static uint64_t float_bits(float value)
@@ -192,13 +180,15 @@ static brume_result work_shadow(struct run *run)
     TRY(shadows_layout(&renderer->shadows, request->snapshot, &request->settings,
                        &renderer->geometry, &renderer->shadow_plan, request->control));
     TRY(shadows_upload(run->gpu, &renderer->shadows));
-    return shadows_render(run->gpu, &renderer->shadows, &renderer->geometry, request->control);
+    return shadows_render(run->gpu, &renderer->shadows, &renderer->geometry,
+                          renderer->stages[BRUME_STAGE_UPLOAD].revision, request->control,
+                          &run->request->stats.shadow_maps_drawn);
 }
 
 static brume_result work_transport(struct run *run)
 {
     struct renderer *renderer = run->renderer;
-    const struct render_request *request = run->request;
+    struct render_request *request = run->request;
     const struct method *method = method_find(request->settings.method);
     job_report(request->control, BRUME_STAGE_TRANSPORT, 0.1f);
     TRY(lattice_layout(run->gpu, renderer, request));
@@ -214,7 +204,11 @@ static brume_result work_transport(struct run *run)
         .control = request->control,
         .frame = &renderer->frame,
         .lights = renderer->shadows.lights,
+        .samples = renderer->shadows.samples,
         .light_count = renderer->shadows.light_count,
+        .medium_revision = renderer->stages[BRUME_STAGE_MEDIUM].revision,
+        .world_signature = renderer->shadows.world_signature,
+        .stats = &request->stats,
         .tau_size = {renderer->tau_size[0], renderer->tau_size[1], renderer->tau_size[2]},
     };
     return method->run(&renderer->transport, &input);

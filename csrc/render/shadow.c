@@ -2,6 +2,7 @@
 /* Shadow maps: perspective faces around lamps, orthographic maps along suns and the world's
  * samples. */
 #include "render/shadow.h"
+#include "base/hash.h"
 #include "base/result.h"
 #include "math/frame.h"
 #include "scene/light.h"
@@ -320,12 +321,55 @@ brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows)
     /* A sampler wants a texture, even where nothing casts a shadow. */
     const int layers = shadows->view_count ? (int)shadows->layer_count : 1;
     const int side = shadows->view_count ? shadows->side : 1;
+    if (shadows->maps.width != side || shadows->maps.depth != layers || !shadows->drawn) {
+        free(shadows->drawn);
+        shadows->drawn = calloc((size_t)layers * WORLD_TILES, sizeof *shadows->drawn);
+        if (!shadows->drawn)
+            return fail(BRUME_E_MEMORY, "no memory for %d shadow maps", layers);
+    }
     return texture_ensure(memory, &shadows->maps, FOR_SHADOW, GL_TEXTURE_2D_ARRAY,
                           GL_DEPTH_COMPONENT32F, side, side, layers, 1, "shadow maps");
 }
 
+/* Whole layers and first quarters share a place: never is one of a layer a lamp's and another the
+ * world's. */
+static uint64_t *place_of(const struct shadows *shadows, const vec4 *tile)
+{
+    const int quarter = (tile->x > 0.0f) + 2 * (tile->y > 0.0f);
+    return &shadows->drawn[(int)tile->w * WORLD_TILES + quarter];
+}
+
+static uint64_t map_signature(const struct shadows *shadows, uint32_t number, uint64_t casters)
+{
+    /* The number, since it seeds the alpha test. */
+    const uint64_t parts[] = {casters, number};
+    const uint64_t hash = hash_bytes(HASH_START, parts, sizeof parts);
+    return hash_bytes(hash, &shadows->views[number], sizeof *shadows->views);
+}
+
+static brume_result draw_map(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,
+                             uint32_t number)
+{
+    const vec4 tile = shadows->views[number].tile;
+    const float side = (float)shadows->side;
+    static const float far_ = 0.0f;
+    const GLint x = (GLint)(tile.x * side), y = (GLint)(tile.y * side);
+    const GLsizei size = (GLsizei)(tile.z * side);
+    glNamedFramebufferTextureLayer(shadows->framebuffer, GL_DEPTH_ATTACHMENT, shadows->maps.id, 0,
+                                   (GLint)tile.w);
+    glViewport(x, y, size, size);
+    glScissor(x, y, size, size);
+    glEnable(GL_SCISSOR_TEST); /* the maps beside it stay */
+    glClearNamedFramebufferfv(shadows->framebuffer, GL_DEPTH, 0, &far_);
+    glDisable(GL_SCISSOR_TEST);
+    const struct gpu_draw stage = {.clip_from_world = shadows->views[number].clip_from_world,
+                                   .info = {number, 0, 0, 0}};
+    return geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_SHADOW, GEOMETRY_SHADOW);
+}
+
 brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,
-                            struct job_control *control)
+                            uint64_t geometry_revision, struct job_control *control,
+                            uint32_t *drawn)
 {
     if (!shadows->framebuffer) {
         glCreateFramebuffers(1, &shadows->framebuffer);
@@ -335,22 +379,29 @@ brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geo
     glTextureParameteri(shadows->maps.id, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     glTextureParameteri(shadows->maps.id, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     glBindFramebuffer(GL_FRAMEBUFFER, shadows->framebuffer);
-    for (uint32_t i = 0; i < shadows->view_count; ++i) {
-        if (job_cancelled(control))
-            return fail(BRUME_E_CANCELLED, "cancelled");
-        const vec4 tile = shadows->views[i].tile;
-        const float side = (float)shadows->side;
-        static const float far_ = 0.0f;
-        glNamedFramebufferTextureLayer(shadows->framebuffer, GL_DEPTH_ATTACHMENT, shadows->maps.id,
-                                       0, (GLint)tile.w);
-        if (tile.x == 0.0f && tile.y == 0.0f) /* the first of its layer */
-            glClearNamedFramebufferfv(shadows->framebuffer, GL_DEPTH, 0, &far_);
-        glViewport((GLint)(tile.x * side), (GLint)(tile.y * side), (GLsizei)(tile.z * side),
-                   (GLsizei)(tile.z * side));
-        const struct gpu_draw stage = {.clip_from_world = shadows->views[i].clip_from_world,
-                                       .info = {i, 0, 0, 0}};
-        TRY(geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_SHADOW, 1));
-        if (gpu->context.info.software && i % MAPS_A_FINISH == MAPS_A_FINISH - 1)
+    shadows->world_signature =
+        hash_bytes(HASH_START, shadows->samples + shadows->world_first,
+                   shadows->world_count * sizeof *shadows->samples);
+    brume_result result = BRUME_OK;
+    for (uint32_t i = 0; i < shadows->view_count && result == BRUME_OK; ++i) {
+        const uint64_t wanted = map_signature(shadows, i, geometry_revision);
+        uint64_t *holds = place_of(shadows, &shadows->views[i].tile);
+        if (shadows->views[i].tile.z < 1.0f)
+            shadows->world_signature =
+                hash_bytes(shadows->world_signature, &wanted, sizeof wanted);
+        if (*holds == wanted)
+            continue;
+        if (job_cancelled(control)) {
+            result = fail(BRUME_E_CANCELLED, "cancelled");
+            break;
+        }
+        if (shadows->views[i].tile.z == 1.0f)
+            memset(holds, 0, WORLD_TILES * sizeof *holds);
+        *holds = 0;
+        result = draw_map(gpu, shadows, geometry, i);
+        if (result == BRUME_OK)
+            *holds = wanted;
+        if (++*drawn % MAPS_A_FINISH == 0 && gpu->context.info.software)
             glFinish(); /* so that a cancel comes through between some maps */
         job_report(control, BRUME_STAGE_SHADOW, 0.02f + 0.08f * (float)(i + 1) /
                                                             (float)shadows->view_count);
@@ -358,7 +409,7 @@ brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geo
     /* A texture attached lives on after its deletion. */
     glNamedFramebufferTexture(shadows->framebuffer, GL_DEPTH_ATTACHMENT, 0, 0);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
-    return BRUME_OK;
+    return result;
 }
 
 void shadows_bind(const struct shadows *shadows)
@@ -380,5 +431,6 @@ void shadows_finish(struct gpu *gpu, struct shadows *shadows)
     free(shadows->lights);
     free(shadows->samples);
     free(shadows->views);
+    free(shadows->drawn);
     memset(shadows, 0, sizeof *shadows);
 }

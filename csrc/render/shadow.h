@@ -17,6 +17,9 @@ struct shadows {
     uint32_t layer_count;
     struct buffer light_buffer, sample_buffer, view_buffer;
     struct texture maps;
+    uint64_t *drawn; /* what each quarter of a layer holds, the first for a whole layer's map: a
+                        signature of the map, 0: nothing of use */
+    uint64_t world_signature; /* of the world's samples and maps */
     GLuint framebuffer;
 };
 
@@ -39,8 +42,11 @@ brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snap
                             const struct shadow_plan *plan, struct job_control *control);
 /* Uploads them: the tiles in lights[].info may have been set in between. */
 brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows);
+/* Draws the maps that differ from what their places hold, and adds to their count. geometry_revision
+ * tells the casters apart. */
 brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,
-                            struct job_control *control);
+                            uint64_t geometry_revision, struct job_control *control,
+                            uint32_t *drawn);
 void shadows_bind(const struct shadows *shadows);
 void shadows_finish(struct gpu *gpu, struct shadows *shadows);
 

@@ -2,6 +2,9 @@
 /* The table of methods. */
 #include "transport/method.h"
 
+#include <stdlib.h>
+#include <string.h>
+
 static const struct method methods[BRUME_METHOD_COUNT] = {
     [BRUME_METHOD_OPV] = {"OPV", opv_run},
 };
@@ -24,4 +27,6 @@ void transport_finish(struct gpu *gpu, struct transport *transport)
     texture_finish(&gpu->memory, &transport->tau);
     for (int i = 0; i < 3; ++i)
         texture_finish(&gpu->memory, &transport->sky[i]);
+    free(transport->tau_signatures);
+    memset(transport, 0, sizeof *transport);
 }

@@ -14,6 +14,9 @@
 struct transport {
     struct texture tau;    /* optical depth to each light, a tile a light */
     struct texture sky[3]; /* the world's light, spherical harmonics a colour */
+    /* Signatures of what a light's tile and the sky hold, 0: nothing of use. */
+    uint64_t *tau_signatures, sky_signature;
+    uint32_t tau_count;
 };
 
 struct transport_input {
@@ -23,7 +26,11 @@ struct transport_input {
     struct job_control *control;
     const struct gpu_frame *frame;  /* lattices are laid out in it, and bound */
     const struct gpu_light *lights; /* tiles are laid out in them, and bound */
+    const struct gpu_light_sample *samples;
     uint32_t light_count;
+    uint64_t medium_revision;
+    uint64_t world_signature;       /* of the world's samples and shadow maps */
+    brume_stats *stats;             /* counts what is propagated */
     int tau_size[3];                /* texels of the optical depths' texture, 0: none wanted */
 };
 

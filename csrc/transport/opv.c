@@ -2,10 +2,11 @@
 /* OPV: single scattering through one optical depth a cell and light. "Real-time single scattering
  * in heterogeneous media by opacity propagation volumes"; docs/methods/opv.md. The depths (its
  * equation 4) are marched exactly for now; the world's light goes into a lattice of its own. */
+#include "base/hash.h"
 #include "base/result.h"
 #include "transport/method.h"
 
-#include <math.h>
+#include <stdlib.h>
 
 /* Samples whose transmittances are averaged for a light with extent; at most 8 (opv_tau). */
 #define EXTENDED_SAMPLES 4
@@ -58,25 +59,84 @@ static brume_result run_slabs(const struct transport_input *input, const struct 
     return result;
 }
 
+/* All that opv_tau reads of a light, and where it writes. 0: the light has no tile. */
+static uint64_t tau_signature(const struct transport_input *input, const struct gpu_light *light)
+{
+    if (!light->info.w)
+        return 0;
+    const struct gpu_frame *frame = input->frame;
+    const vec4 point = {light->position.x, light->position.y, light->position.z, 0.0f};
+    const uint32_t count = depth_samples(light, frame->lattice_lower.w);
+    const uint64_t parts[] = {input->medium_revision, light->info.x, light->info.y, light->info.z,
+                              count};
+    uint64_t hash = hash_bytes(HASH_START, parts, sizeof parts);
+    hash = hash_bytes(hash, &frame->lattice_lower, sizeof frame->lattice_lower);
+    hash = hash_bytes(hash, &frame->lattice_dims, sizeof frame->lattice_dims);
+    hash = hash_bytes(hash, &point, sizeof point);
+    for (uint32_t i = 0; count > 1 && i < light->samples.y; ++i)
+        hash = hash_bytes(hash, &input->samples[light->samples.x + i].position, sizeof(float[3]));
+    return hash;
+}
+
+/* Keeps the signatures of tiles that stay as they are; 0 for all others. *wanted: of all lights. */
+static brume_result compare_tiles(struct transport *transport, const struct transport_input *input,
+                                  uint64_t **wanted)
+{
+    const struct texture *tau = &transport->tau;
+    const int *size = input->tau_size;
+    const uint32_t kept =
+        tau->width == size[0] && tau->height == size[1] && tau->depth == size[2]
+            ? transport->tau_count : 0;
+    uint64_t *held = calloc(2 * (size_t)input->light_count, sizeof *held);
+    if (!held)
+        return fail(BRUME_E_MEMORY, "no memory for %u lights", input->light_count);
+    *wanted = held + input->light_count;
+    for (uint32_t i = 0; i < input->light_count; ++i) {
+        (*wanted)[i] = tau_signature(input, &input->lights[i]);
+        if (i < kept && transport->tau_signatures[i] == (*wanted)[i])
+            held[i] = (*wanted)[i];
+    }
+    free(transport->tau_signatures);
+    transport->tau_signatures = held;
+    transport->tau_count = input->light_count;
+    return BRUME_OK;
+}
+
 static brume_result run_tau(struct transport *transport, const struct transport_input *input)
 {
     const struct program *program;
+    uint64_t *wanted = NULL;
     TRY(program_compute(&input->gpu->programs, "opv_tau", &program));
+    TRY(compare_tiles(transport, input, &wanted));
     TRY(texture_ensure(&input->gpu->memory, &transport->tau, FOR_TRANSPORT, GL_TEXTURE_3D,
                        GL_RGBA16F, input->tau_size[0], input->tau_size[1], input->tau_size[2], 1,
                        "optical depth"));
     glBindImageTexture(SLOT_OUTPUT, transport->tau.id, 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA16F);
     for (uint32_t i = 0; i < input->light_count; ++i) {
         const struct gpu_light *light = &input->lights[i];
-        if (!light->info.w)
+        if (transport->tau_signatures[i] == wanted[i])
             continue;
         const struct gpu_lattice_pass pass = {
             .offset = {(int)i, (int)depth_samples(light, input->frame->lattice_lower.w),
                        (int)light->info.y, (int)light->info.z}};
         TRY(run_slabs(input, program, pass, &input->frame->lattice_dims,
                       0.1f + 0.1f * (float)(i + 1) / (float)input->light_count));
+        transport->tau_signatures[i] = wanted[i];
+        ++input->stats->lights_propagated;
     }
     return BRUME_OK;
+}
+
+/* All that opv_sky reads. */
+static uint64_t sky_signature(const struct transport_input *input)
+{
+    const struct gpu_frame *frame = input->frame;
+    const uint64_t parts[] = {input->medium_revision, input->world_signature};
+    const vec4 vectors[] = {frame->sky_lower, frame->fog_lower, frame->fog_upper,
+                            frame->fog_sigma_t};
+    uint64_t hash = hash_bytes(HASH_START, parts, sizeof parts);
+    hash = hash_bytes(hash, vectors, sizeof vectors);
+    return hash_bytes(hash, &frame->sky_dims, sizeof frame->sky_dims);
 }
 
 static brume_result run_sky(struct transport *transport, const struct transport_input *input)
@@ -84,6 +144,10 @@ static brume_result run_sky(struct transport *transport, const struct transport_
     static const char *const labels[] = {"sky red", "sky green", "sky blue"};
     const struct program *program;
     const ivec4 *dims = &input->frame->sky_dims;
+    const uint64_t wanted = sky_signature(input);
+    if (transport->sky_signature == wanted)
+        return BRUME_OK;
+    transport->sky_signature = 0;
     TRY(program_compute(&input->gpu->programs, "opv_sky", &program));
     for (int i = 0; i < 3; ++i) {
         TRY(texture_ensure(&input->gpu->memory, &transport->sky[i], FOR_TRANSPORT, GL_TEXTURE_3D,
@@ -92,7 +156,23 @@ static brume_result run_sky(struct transport *transport, const struct transport_
                            GL_WRITE_ONLY, GL_RGBA16F);
     }
     const struct gpu_lattice_pass pass = {0};
-    return run_slabs(input, program, pass, dims, 0.25f);
+    TRY(run_slabs(input, program, pass, dims, 0.25f));
+    transport->sky_signature = wanted;
+    ++input->stats->sky_propagated;
+    return BRUME_OK;
+}
+
+static void forget_tau(struct transport *transport, const struct transport_input *input)
+{
+    texture_finish(&input->gpu->memory, &transport->tau);
+    transport->tau_count = 0;
+}
+
+static void forget_sky(struct transport *transport, const struct transport_input *input)
+{
+    for (int i = 0; i < 3; ++i)
+        texture_finish(&input->gpu->memory, &transport->sky[i]);
+    transport->sky_signature = 0;
 }
 
 brume_result opv_run(struct transport *transport, const struct transport_input *input)
@@ -100,12 +180,11 @@ brume_result opv_run(struct transport *transport, const struct transport_input *
     if (input->tau_size[0] > 0)
         TRY(run_tau(transport, input));
     else
-        texture_finish(&input->gpu->memory, &transport->tau);
+        forget_tau(transport, input);
     if (input->frame->sky_dims.w)
         TRY(run_sky(transport, input));
     else
-        for (int i = 0; i < 3; ++i)
-            texture_finish(&input->gpu->memory, &transport->sky[i]);
+        forget_sky(transport, input);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     return BRUME_OK;
 }

@@ -185,6 +185,113 @@ static void settings_changes(void **state)
     brume_scene_destroy(f.scene);
 }
 
+/* What a job redid, in all: shadow maps, lamps' tiles, the sky. */
+static void assert_redone(const struct fixture *f, uint32_t maps, uint32_t lamps, uint32_t sky)
+{
+    brume_stats stats;
+    brume_job *job = render(f->scene, &f->settings, &f->view);
+    assert_ok(brume_job_stats(job, &stats));
+    brume_job_release(job);
+    if (stats.shadow_maps_drawn != maps || stats.lights_propagated != lamps ||
+        stats.sky_propagated != sky)
+        fail_msg("drew %u maps, propagated %u lamps and %u skies; expected %u, %u, %u",
+                 stats.shadow_maps_drawn, stats.lights_propagated, stats.sky_propagated, maps,
+                 lamps, sky);
+}
+
+/* Bit for bit what a scene that never was another shows. */
+static void assert_as_new(const struct fixture *f, void (*fill)(brume_scene *scene))
+{
+    brume_scene *scenes[2] = {f->scene};
+    float *pixels[2];
+    assert_ok(brume_scene_create(device, &scenes[1]));
+    fill(scenes[1]);
+    for (int i = 0; i < 2; ++i) {
+        brume_job *job = render(scenes[i], &f->settings, &f->view);
+        pixels[i] = read_pass(job, &f->view, BRUME_PASS_COMBINED);
+        brume_job_release(job);
+    }
+    assert_memory_equal(pixels[0], pixels[1], 8 * 8 * 4 * sizeof(float));
+    free(pixels[0]);
+    free(pixels[1]);
+    brume_scene_destroy(scenes[1]);
+}
+
+enum { LAMPS = 8, LAMP_MAPS = 2 * 6, WORLD_MAPS = 6 }; /* two samples of six faces */
+
+static void set_ball(brume_scene *scene, uint64_t key, float x, float power)
+{
+    brume_light lamp = point_lamp((float[3]){x, 0.5f * (float)key - 1.5f, 2}, power);
+    lamp.radius = 0.3f;
+    assert_ok(brume_scene_set_light(scene, key, &lamp));
+}
+
+static void fill_with_lamps(brume_scene *scene)
+{
+    const brume_world world = {.color = {0.2f, 0.3f, 0.4f}};
+    add_fog_cube(scene, 1, origin, 0.5f, &fog);
+    add_plate(scene, 1, (float[3]){0, 0, -1}, (float[3]){0, 0, -1}, 2.0f);
+    for (uint64_t key = 0; key < LAMPS; ++key)
+        set_ball(scene, key, 0.3f, 5.0f);
+    assert_ok(brume_scene_set_world(scene, &world));
+}
+
+static void fill_with_moved_lamp(brume_scene *scene)
+{
+    fill_with_lamps(scene);
+    set_ball(scene, 3, -0.6f, 5.0f);
+}
+
+static void work_grows_with_changes(void **state)
+{
+    (void)state;
+    struct fixture f = {.settings = small_settings(),
+                        .view = orthographic_view(origin, down, 2.0f, 3.0f, 8)};
+    f.view.samples = 2;
+    f.settings.world_samples = WORLD_MAPS;
+    assert_ok(brume_scene_create(device, &f.scene));
+    fill_with_lamps(f.scene);
+    assert_redone(&f, LAMPS * LAMP_MAPS + WORLD_MAPS, LAMPS, 1);
+    assert_redone(&f, 0, 0, 0);
+
+    /* One lamp moves: its maps, its tile; there and back. */
+    set_ball(f.scene, 3, -0.6f, 5.0f);
+    assert_redone(&f, LAMP_MAPS, 1, 0);
+    assert_as_new(&f, fill_with_moved_lamp);
+    set_ball(f.scene, 3, 0.3f, 5.0f);
+    assert_redone(&f, LAMP_MAPS, 1, 0);
+    assert_as_new(&f, fill_with_lamps);
+    set_ball(f.scene, 3, 0.3f, 7.0f); /* brighter, where it was */
+    assert_redone(&f, 0, 0, 0);
+    set_ball(f.scene, 3, 0.3f, 0.0f); /* out: another layout of the tiles */
+    assert_redone(&f, 0, LAMPS - 1, 0);
+    set_ball(f.scene, 3, 0.3f, 5.0f);
+    assert_redone(&f, 0, LAMPS, 0);
+    assert_as_new(&f, fill_with_lamps);
+
+    f.view.seed = 3;
+    assert_redone(&f, 0, 0, 0);
+    const struct coefficients thin = {.sigma_s = {0.1f, 0.1f, 0.1f}};
+    add_fog_cube(f.scene, 1, origin, 0.5f, &thin);
+    assert_redone(&f, 0, LAMPS, 1);
+    add_fog_cube(f.scene, 1, origin, 0.5f, &fog);
+    assert_redone(&f, 0, LAMPS, 1);
+    const brume_world brighter = {.color = {1, 1, 1}};
+    assert_ok(brume_scene_set_world(f.scene, &brighter)); /* from the same directions */
+    assert_redone(&f, 0, 0, 1);
+
+    /* A caster changes: every map, and the world's light in the medium, which they shadow. */
+    add_plate(f.scene, 1, (float[3]){0, 0.1f, -1}, (float[3]){0, 0, -1}, 2.0f);
+    assert_redone(&f, LAMPS * LAMP_MAPS + WORLD_MAPS, 0, 1);
+    /* Lamps come and go: another layout. */
+    assert_ok(brume_scene_remove(f.scene, BRUME_KIND_LIGHT, 0));
+    rerun(&f);
+    fill_with_lamps(f.scene);
+    rerun(&f);
+    assert_as_new(&f, fill_with_lamps);
+    brume_scene_destroy(f.scene);
+}
+
 /* A job cancelled before it began has run nothing; the change that it would have worked on is still
  * worked on by the next. */
 static void cancelled_stages_run_again(void **state)
@@ -249,6 +356,7 @@ int main(void)
         cmocka_unit_test(nothing_changed),     cmocka_unit_test(view_changes),
         cmocka_unit_test(light_changes),       cmocka_unit_test(medium_changes),
         cmocka_unit_test(surface_changes),     cmocka_unit_test(settings_changes),
+        cmocka_unit_test(work_grows_with_changes),
         cmocka_unit_test(cancelled_stages_run_again), cmocka_unit_test(failed_stages_run_again),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);

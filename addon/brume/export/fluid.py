@@ -65,13 +65,13 @@ def _box(ob):
     return matrix
 
 
-def export(target, programs, ob, settings, material, matrix, key):
+def export(target, ob, settings, material, matrix, key):
     """Puts one instance of a domain, if its material has a volume shader. Unlike a volume object's
     its coefficients are per metre of the world, whatever the object's scale (as in Cycles)."""
     names = [name for name, (attribute, _) in _GRIDS.items() if len(getattr(settings, attribute))]
     if not names:
         return  # no cache at this frame: there is no smoke
-    program = program_for(target, programs, material, names)
+    program = program_for(target, material, names)
     if program is None:
         return
     for name in program.unknown:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
+from ..compat import identity
 from .target import key_of_datablock
 
 _BYTES = np.arange(256) / 255.0
@@ -72,8 +73,12 @@ def export(target, texture, channel=None):
     """The key of a texture in the library's scene."""
     image, extend, nearest = texture
     key = key_of_datablock(image, extend, nearest, channel)
-    if target.seen("image", key):
-        return key
+    return target.part(("image", key), None, {identity(image)},
+                       lambda: _export(target, texture, channel, key))
+
+
+def _export(target, texture, channel, key):
+    image, extend, nearest = texture
 
     def warn(sentence):
         target.reports.unsupported(f'Image "{image.name}"', sentence)

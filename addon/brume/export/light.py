@@ -41,6 +41,15 @@ def _shape(light):
 
 def export(target, ob, matrix, persistent_id=(), camera_visible=True):
     """Puts one lamp; matrix is the instance's, by rows."""
+    key = key_of_datablock(ob, *persistent_id)
+    stamp = compat.identity(ob.data), ob.name, matrix.tobytes(), camera_visible
+    # A lamp's identity changes with its type, of which its object tells.
+    reads = nodes.identities(ob.data) | {compat.identity(ob)}
+    target.part(("light", key), stamp, reads,
+                lambda: _export(target, ob, matrix, key, camera_visible))
+
+
+def _export(target, ob, matrix, key, camera_visible):
     light = ob.data
     if compat.light_is_portal(light):
         return
@@ -56,7 +65,7 @@ def export(target, ob, matrix, persistent_id=(), camera_visible=True):
     if (power < 0).any():
         warn("negative light is left out.")
         power = np.maximum(power, 0.0)
-    target.put("light", key_of_datablock(ob, *persistent_id), name=ob.name,
+    target.put("light", key, name=ob.name,
                world_from_light=matrix, power=tuple(power.tolist()),
                cast_shadow=bool(compat.light_casts_shadow(light)),
                camera_visible=bool(camera_visible and compat.light_is_seen(light)), **_shape(light))

@@ -307,19 +307,28 @@ def volume_tree(material):
 def _plain(target, key, name, diffuse):
     target.put("material", key, name=name, **(NO_LOBES | {"diffuse": diffuse}),
                transparent=np.ones(3), roughness=0.5, alpha=1.0, alpha_mode='OPAQUE')
-    return key
+
+
+def key_of_material(material):
+    """In the library's scene."""
+    return DEFAULT_KEY if material is None else key_of_datablock(material)
 
 
 def export(target, material):
-    """The key of a material in the library's scene."""
+    """Puts a material; None is grey."""
+    key = key_of_material(material)
     if material is None:
-        return _plain(target, DEFAULT_KEY, "default", GREY)
-    key = key_of_datablock(material)
-    if target.seen("material", key):
-        return key
+        _plain(target, key, "default", GREY)
+    else:
+        target.part(("material", key), None, nodes.identities(material),
+                    lambda: _export(target, material, key))
+
+
+def _export(target, material, key):
     tree = compat.node_tree(material)
     if tree is None:
-        return _plain(target, key, material.name, np.array(material.diffuse_color[:3]))
+        _plain(target, key, material.name, np.array(material.diffuse_color[:3]))
+        return
     owner = f'Material "{material.name}"'
     walk = _Walk(lambda sentence: target.reports.unsupported(owner, sentence))
     place = nodes.output_place(tree, "Surface")
@@ -341,4 +350,3 @@ def export(target, material):
         base_image=image.export(target, base, channel) if base else 0,
         roughness_image=image.export(target, rough.texture, rough.channel or "L") if rough else 0,
         alpha_from_base_image=walk.mask is not None)
-    return key

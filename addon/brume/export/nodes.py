@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import bpy
 
+from ..compat import identity
+
 
 class Place(NamedTuple):
     """An input socket, and the group nodes around it, outermost first."""
@@ -75,6 +77,19 @@ def output_source(tree, identifier):
     place = output_place(tree, identifier)
     source = place and follow(place)
     return source if source and source.node else None
+
+
+def identities(owner):
+    """Of a material, world or lamp and of all node groups that it is made of."""
+    found, trees = {identity(owner)}, [owner.node_tree]
+    while trees:
+        tree = trees.pop()
+        for node in tree.nodes if tree else ():
+            group = getattr(node, "node_tree", None)
+            if group and identity(group) not in found:
+                found.add(identity(group))
+                trees.append(group)
+    return found
 
 
 def label(node):

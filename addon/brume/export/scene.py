@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One pass over the evaluated depsgraph: every visible object goes to its module."""
+"""One pass over the evaluated depsgraph: every visible object goes to its module.
 
+The pass itself is made in every export: it is quick, and shows what comes, goes, moves and hides.
+Meshes, materials and the like are read again only if they changed: target.part sees to that.
+"""
+
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +13,8 @@ import numpy as np
 from .. import native, properties
 from ..compat import identity
 from ..native import BrumeError
-from . import fluid, light, material, mesh, volume, world
+from . import fluid, light, material, mesh, nodes, volume, world
+from .changes import GEOMETRY
 from .target import key_of, key_of_datablock
 
 # Drawn by neither Brume nor Cycles, or presented to engines a second time, as a mesh.
@@ -16,15 +22,33 @@ _UNSEEN = {'EMPTY', 'ARMATURE', 'LATTICE', 'CAMERA', 'SPEAKER', 'LIGHT_PROBE', '
            'FONT', 'META'}
 
 
+class _Material(NamedTuple):
+    """A material slot: what its nodes make of the mesh."""
+    material: object
+    identity: str
+    surface: bool
+    volume: bool
+
+
 class _Shape(NamedTuple):
-    """What an object's data becomes: a mesh's key (None: no surface), and the arrays and the
-    material of a medium inside (None: none)."""
+    """What an object's data becomes: a mesh's key (None: no surface), and the arrays and the slot
+    of a medium inside (None: none)."""
     mesh: int
     arrays: dict
-    medium: object
+    medium: int
+    serial: int   # differs between all shapes
 
 
-_NOTHING = _Shape(None, None, None)
+_serial = itertools.count()
+
+
+class _Thing:
+    """What all instances of one object with one shape have in common."""
+
+    def __init__(self, each=None, mesh=None, visibility=0):
+        self.each = each      # called with every instance, its object and matrix, unless None
+        self.group = mesh, visibility
+        self.indices = []     # of the instances
 
 
 def _path(instance):
@@ -34,70 +58,120 @@ def _path(instance):
     return (identity(instance.parent), *instance.persistent_id)
 
 
+def _matrices(instances):
+    """Of all instances, hidden ones too, by rows."""
+    values = np.empty(len(instances) * 16, np.float32)
+    instances.foreach_get("matrix_world", values)
+    return values.reshape(-1, 4, 4).swapaxes(1, 2)
+
+
 class _Export:
-    def __init__(self, depsgraph, target):
-        self.depsgraph, self.target = depsgraph, target
+    def __init__(self, depsgraph, target, space):
+        self.depsgraph, self.target, self.space = depsgraph, target, space
         self.override = depsgraph.view_layer_eval.material_override
         self.view_layer = depsgraph.view_layer
-        self.shapes = {}    # by data and object, and by data and materials
-        self.names = {}     # how many meshes of one name came up
-        self.programs = {}  # compiled volume shaders
-        self.groups = {}    # (mesh, visibility) -> matrices
+        self.things = {}     # by object and data
+        self.shown = {}      # by object: whether the space shows it
+        self.slots = {}      # by material: _Material
+        self.shared = {}     # by mesh: its evaluated one
+        self.numbers = {}    # how many shapes came up of one object and mesh
 
     def warn(self, ob, sentence):
         self.target.reports.unsupported(f'Object "{ob.name}"', sentence)
 
     def run(self):
-        for instance in self.depsgraph.object_instances:
-            if not instance.show_self:
+        instances = self.depsgraph.object_instances
+        matrices = _matrices(instances)
+        for index, instance in enumerate(instances):
+            if not instance.show_self or self.space and not self.is_shown(instance):
                 continue
             ob = instance.object
+            key = ob.original, ob.data
             try:
-                self.instance(instance, ob)
+                thing = self.things.get(key)
+                if thing is None:
+                    thing = self.things[key] = _Thing()
+                    self.things[key] = thing = self.thing(instance, ob)
+                thing.indices.append(index)
+                if thing.each is not None:
+                    thing.each(instance, ob, matrices[index])
             except BrumeError as error:
                 self.target.reports.warn(error.id, f'Object "{ob.name}": {error.sentence}')
-        for (key, visibility), matrices in self.groups.items():
-            self.target.put("instances", key_of(key, visibility), mesh=key,
-                            world_from_object=np.array(matrices, np.float32),
-                            visibility=visibility)
+        self.put_instances(matrices)
 
-    def instance(self, instance, ob):
+    def put_instances(self, matrices):
+        groups = {}
+        for thing in self.things.values():
+            groups.setdefault(thing.group, []).extend(thing.indices)
+        for (key, visibility), indices in groups.items():
+            if key is not None and visibility:
+                block = matrices[indices]
+                self.target.put("instances", key_of(key, visibility), block.tobytes(), mesh=key,
+                                world_from_object=block, visibility=visibility)
+
+    def is_shown(self, instance):
+        """Whether the view shows it: an instance is as its instancer."""
+        ob = (instance.parent if instance.is_instance else instance.object).original
+        shown = self.shown.get(ob)
+        if shown is None:
+            shown = self.shown[ob] = ob.visible_in_viewport_get(self.space)
+        return shown
+
+    def thing(self, instance, ob):
         if ob.type == 'LIGHT':
-            light.export(self.target, ob, np.array(instance.matrix_world), _path(instance),
-                         ob.visible_camera)
-        elif ob.type == 'VOLUME':
-            volume.export_volume_object(
-                self.target, self.programs, ob, np.array(instance.matrix_world),
-                key_of_datablock(ob, "volume", *_path(instance)), self.override)
-        elif ob.type == 'MESH':
-            self.surface(instance, ob)
-        elif ob.type not in _UNSEEN:
+            return _Thing(self.light)
+        if ob.type == 'VOLUME':
+            return _Thing(self.volume)
+        if ob.type == 'MESH':
+            return self.surface(instance, ob)
+        if ob.type not in _UNSEEN:
             self.warn(ob, f"objects of type {ob.type} are not shown.")
+        return _Thing()
+
+    def light(self, instance, ob, matrix):
+        light.export(self.target, ob, matrix, _path(instance), ob.visible_camera)
+
+    def volume(self, instance, ob, matrix):
+        volume.export_volume_object(
+            self.target, ob, matrix, key_of_datablock(ob, "volume", *_path(instance)),
+            self.makers(instance, ob), self.override)
+
+    def makers(self, instance, ob):
+        """Identities of what an object's data is made of."""
+        found = {identity(ob), identity(ob.data)}
+        if instance.is_instance:
+            found.add(identity(instance.parent))
+        return found
 
     # -- surfaces
 
     def surface(self, instance, ob):
-        known = (ob.data.as_pointer(), ob.original.as_pointer())
-        shape = self.shapes.get(known)
-        if shape is None:
-            self.name_hair(ob)
-            shape = self.shapes[known] = self.shape(ob)
+        slots = [self.slot(m) for m in self.materials(ob)]
+        shape, reads = self.shape(instance, ob, slots)
         if shape.mesh is not None:
-            visibility = self.visibility(ob)
-            if visibility:
-                matrices = self.groups.setdefault((shape.mesh, visibility), [])
-                matrices.append(instance.matrix_world.copy())
+            for slot in slots:
+                material.export(self.target, slot.material)
+        each = None
         if shape.medium is not None:
-            self.medium(instance, ob, shape, key_of_datablock(ob, "medium", *_path(instance)))
+            medium = slots[shape.medium]
 
-    def medium(self, instance, ob, shape, key):
-        matrix = np.array(instance.matrix_world)
+            def each(instance, ob, matrix):
+                self.medium(instance, ob, matrix, shape, medium, reads)
+        return _Thing(each, shape.mesh, self.visibility(ob))
+
+    def medium(self, instance, ob, matrix, shape, medium, reads):
+        key = key_of_datablock(ob, "medium", *_path(instance))
+        stamp = (ob.name, matrix.tobytes(), medium.identity, shape.serial,
+                 tuple(map(tuple, ob.bound_box)))
         domain = fluid.gas_domain(ob)
-        if domain is not None:
-            fluid.export(self.target, self.programs, ob, domain, shape.medium, matrix, key)
-        else:
-            volume.export_mesh_volume(self.target, self.programs, ob, shape.arrays, shape.medium,
-                                      matrix, key)
+
+        def make():
+            if domain is not None:
+                fluid.export(self.target, ob, domain, medium.material, matrix, key)
+            else:
+                volume.export_mesh_volume(self.target, ob, shape.arrays, medium.material, matrix,
+                                          key)
+        self.target.part(("medium", key), stamp, reads, make)
 
     def visibility(self, ob):
         original = ob.original
@@ -108,56 +182,78 @@ class _Export:
             bits |= native.VISIBLE_HOLDOUT
         return bits
 
+    def is_own(self, ob):
+        """Whether the data is the object's, not what modifiers or curves made beside it."""
+        return ob.original.evaluated_get(self.depsgraph).data == ob.data
+
     def materials(self, ob):
         """The material of each slot; never empty. What modifiers or curves made has its own."""
-        own = ob.original.evaluated_get(self.depsgraph).data == ob.data
-        found = ([slot.material for slot in ob.material_slots] if own
+        found = ([slot.material for slot in ob.material_slots] if self.is_own(ob)
                  else list(ob.data.materials)) or [None]
         return [self.override] * len(found) if self.override else found
 
-    def shape(self, ob):
+    def slot(self, found):
+        if found not in self.slots:
+            name = found and identity(found)
+            surface, medium = (True, False) if found is None else self.target.part(
+                ("slot", name), None, nodes.identities(found),
+                lambda: (material.has_surface(found), material.volume_tree(found) is not None))
+            self.slots[found] = _Material(found, name, surface, medium)
+        return self.slots[found]
+
+    def shape(self, instance, ob, slots):
+        """What the object's data becomes, and the identities of what that is made of."""
+        name, reads = identity(ob.data), {identity(ob.data)}
+        kinds, own = tuple(slot[1:] for slot in slots), self.is_own(ob)
+        if own and not ob.modifiers and self.shared.setdefault(name, ob.data) == ob.data:
+            # Objects without modifiers share their evaluated mesh.
+            label, part = ob.data.name, ("mesh", name, kinds)
+        else:
+            owner = identity(ob)
+            number = self.numbers[owner, name] = self.numbers.get((owner, name), 0) + 1
+            label, part = ob.name, ("mesh", name, owner, number)
+            reads.add(owner)
+            if instance.is_instance and not own:
+                reads.add(identity(instance.parent))
+        stamp = label, ob.data.as_pointer(), kinds
+        return self.target.part(part, stamp, reads,
+                                lambda: self.make_shape(ob, slots, key_of(*part), label)), reads
+
+    def make_shape(self, ob, slots, key, name):
         """Puts an object's mesh and finds its medium."""
-        slots = self.materials(ob)
-        medium, *others = [m for m in slots if material.volume_tree(m)] or [None]
-        for name in sorted({other.name for other in others if other != medium}):
-            self.warn(ob, f'the volume of material "{name}" is not shown, since an object has one, '
-                          f'and that is of "{medium.name}".')
-        domain = fluid.gas_domain(ob) is not None
-        # Objects without modifiers share their evaluated mesh.
-        shared = (ob.data.as_pointer(), tuple(m.as_pointer() if m else 0 for m in slots))
-        if not domain and shared in self.shapes:
-            return self.shapes[shared]
-        seen = [i for i, m in enumerate(slots) if material.has_surface(m)]
-        if domain and medium is None and not any(slots):
-            return _NOTHING  # a domain without a material is no grey box
+        medium, *others = [i for i, slot in enumerate(slots) if slot.volume] or [None]
+        for other in sorted({slots[i].material.name for i in others
+                             if slots[i].material != slots[medium].material}):
+            self.warn(ob, f'the volume of material "{other}" is not shown, since an object has '
+                          f'one, and that is of "{slots[medium].material.name}".')
+        for system in ob.particle_systems:
+            if system.settings.type == 'HAIR' and system.settings.render_type == 'PATH':
+                self.warn(ob, f'the hair of "{system.name}" is not shown.')
+        nothing = _Shape(None, None, None, next(_serial))
+        if medium is None and fluid.gas_domain(ob) and all(slot.material is None for slot in slots):
+            return nothing  # a domain without a material is no grey box
         arrays = mesh.read(ob.data)
         if arrays is None:
-            return _NOTHING
+            return nothing
         # A slot number beyond the slots means the last one, as in Blender.
         arrays["triangle_slots"] = np.minimum(arrays["triangle_slots"], len(slots) - 1)
-        drawn = mesh.only_slots(arrays, seen)
-        key = self.put_mesh(ob, drawn, slots) if drawn else None
-        shape = self.shapes[shared] = _Shape(key, arrays if medium else None, medium)
-        return shape
-
-    def put_mesh(self, ob, arrays, slots):
-        keys = tuple(material.export(self.target, m) for m in slots)
-        number = self.names[ob.data.name_full] = self.names.get(ob.data.name_full, 0) + 1
-        key = key_of_datablock(ob.data, "mesh", number)
-        put = self.target.put("mesh", key, name=ob.name, materials=keys, **arrays)
-        return key if put else None
-
-    def name_hair(self, ob):
-        for system in ob.particle_systems:
-            settings = system.settings
-            if settings.type == 'HAIR' and settings.render_type == 'PATH':
-                self.warn(ob, f'the hair of "{system.name}" is not shown.')
+        drawn = mesh.only_slots(arrays, [i for i, slot in enumerate(slots) if slot.surface])
+        keys = tuple(material.key_of_material(slot.material) for slot in slots)
+        put = drawn and self.target.put("mesh", key, name=name, materials=keys, **drawn)
+        inside = None if medium is None else {n: arrays[n] for n in ("positions", "triangles")}
+        return _Shape(key if put else None, inside, medium, next(_serial))
 
 
-def export(depsgraph, target):
-    """Fills the target with the depsgraph's scene; what could not be shown is in its reports."""
-    target.begin()
+def export(depsgraph, target, changed=None, space=None):
+    """Fills the target with the depsgraph's scene; what could not be shown is in its reports.
+    changed: what changes.Changes gave since the last export from there, so that only that is read
+    again; None: all is. space: a 3D view whose hidden objects are left out."""
+    if changed is not None:
+        # What an object is made of comes into its parts' stamps, but for its data.
+        changed = {name for name, flags in changed.items()
+                   if flags & GEOMETRY or not name.startswith("Object:")}
+    target.begin(changed)
     scene = depsgraph.scene_eval
     world.export(target, scene.world, properties.world_reach(scene.brume))
-    _Export(depsgraph, target).run()
+    _Export(depsgraph, target, space).run()
     target.end()

@@ -6,13 +6,16 @@ import os
 import re
 import tempfile
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ..compat import identity
 from ..native import BrumeError, Grid, vdb_list
 from . import material as materials
+from . import nodes
 from .volume_shader import compile_volume, default_program
 
 
@@ -25,14 +28,13 @@ def density_scale(matrix):
     return 1.0 / length
 
 
-def program_for(target, programs, material, available):
+def program_for(target, material, available):
     """The compiled program of a material for a medium with these grids; None if the material has
-    no volume shader. programs: those of this export."""
+    no volume shader."""
     available = frozenset(available)
-    key = (material.as_pointer() if material else 0, available)
-    if key not in programs:
-        programs[key] = _compile(target, material, available)
-    return programs[key]
+    name = "program", material and identity(material), available
+    return target.part(name, None, nodes.identities(material) if material else (),
+                       lambda: _compile(target, material, available))
 
 
 def _compile(target, material, available):
@@ -56,38 +58,23 @@ def _scratch_file():
         yield os.path.join(path, "volume.vdb")
 
 
-class _File:
-    """A .vdb on disk, or bytes that are one; gives the names of its grids and the grids."""
+class _Scratch:
+    """Bytes that are a .vdb; as files.File."""
 
-    def __init__(self, path, stamp):
-        self.path, self.stamp = path, stamp
+    def __init__(self, target, path):
+        self.target, self.path = target, path
+        digest = hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest()
+        self.stamp = "memory", digest
         self.infos = {info.name.decode(): info for info in vdb_list(path)}
 
-    def grid(self, target, name):
-        return target.grid((*self.stamp, name), lambda: Grid.load_vdb(self.path, name))
-
-
-@contextmanager
-def _from_memory(write):
-    """A file that lives as long as the block; write(path) fills it."""
-    with _scratch_file() as path:
-        write(path)
-        digest = hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest()
-        yield _File(path, ("memory", digest))
+    def grids(self, names):
+        return [self.target.grid((*self.stamp, name), partial(Grid.load_vdb, self.path, name))
+                for name in names]
 
 
 def _save(volume, path):
     if not volume.grids.save(filepath=path):
         raise BrumeError("VOLUME_SAVE", "its grids could not be saved by Blender.")
-
-
-@contextmanager
-def _on_disk(path):
-    try:
-        stamp = os.stat(path).st_mtime_ns
-    except OSError:
-        stamp = None  # the library says what is wrong with the path
-    yield _File(path, (path, stamp))
 
 
 # Voxels along a side that no field of smoke has, but a box around stray voxels.
@@ -113,63 +100,96 @@ def frame_path(volume, library=None):
     return f"{head}{'-' if frame < 0 else ''}{abs(frame):0{len(digits)}}{extension}"
 
 
-def _file_of(ob):
-    """A context that gives the file of a volume object, or None where it has no grids at all."""
+def _on_disk(ob):
+    """Whether the grids are those of a file, which Blender need not read."""
+    original = ob.original
+    return (original.type == 'VOLUME' and bool(ob.data.filepath) and not original.modifiers
+            and not original.data.packed_file)
+
+
+def _writer(ob):
+    """A function that writes the grids of a volume without a file of its own to a path; None if
+    there are none."""
     volume, original = ob.data, ob.original
     if original.type == 'VOLUME' and volume.filepath:
         packed = original.data.packed_file
+        if packed and not original.modifiers:
+            # Blender itself does not read these once the file is gone.
+            return lambda path: Path(path).write_bytes(packed.data)
         path = frame_path(volume, original.data.library)
-        if not original.modifiers:
-            if packed:  # Blender itself does not read these once the file is gone
-                return _from_memory(lambda path: Path(path).write_bytes(packed.data))
-            return _on_disk(path) if path else None
         if path and not packed:
             vdb_list(path)  # raises if the file is damaged, before Blender opens it
     volume.grids.load()
-    if len(volume.grids):
-        return _from_memory(lambda path: _save(volume, path))
-    return None
+    return partial(_save, volume) if len(volume.grids) else None
 
 
-def export_volume_object(target, programs, ob, matrix, key, override=None):
-    """Puts one instance of a volume object; raises BrumeError."""
-    opened = _file_of(ob)
-    if opened is None:
-        return
+def export_volume_object(target, ob, matrix, key, reads, override=None):
+    """Puts one instance of a volume object; reads: identities of what made it. Raises
+    BrumeError."""
     material = override or next((slot.material for slot in ob.material_slots if slot.material),
                                 None)
-    with opened as file:
-        program = program_for(target, programs, material, file.infos)
-        if program is None:
-            target.reports.unsupported(f'Volume "{ob.name}"',
-                                       f'its material "{material.name}" has no volume shader.')
+    stamp = ob.name, matrix.tobytes(), material and identity(material)
+    if _on_disk(ob):
+        path = frame_path(ob.data, ob.original.data.library)
+        if path is None:
             return
-        for name in program.unknown:
-            target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": no grid "{name}" in '
-                                                f"{file.path}; it reads as 0.")
-        for name in program.unused:
-            target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": no grid "{name}" in '
-                                                f"{file.path}; Principled Volume does without.")
-        if not program.grids:
-            target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": its material uses none of '
-                                                f"the grids in {file.path}; it is left out.")
+        file = target.files.open(key, path)
+        if file is None:
+            target.unfinished("volume", key)
             return
-        grids = [file.grid(target, name) for name in program.grids]
-        for name in program.grids:
-            width = max(file.infos[name].file_dims)
-            if width > _WIDEST:
-                target.reports.warn(
-                    "GRID_WIDE", f'Volume "{ob.name}": the grid "{name}" in {file.path} is {width} '
-                                 f"voxels wide. All volumes get as coarse as its box is large: "
-                                 f"are there stray voxels far away?")
-        scale = density_scale(matrix) if ob.data.render.space == 'OBJECT' else 1.0
-        target.put("volume", key, name=ob.name, program=program, grids=grids,
-                   world_from_object=matrix, scale=scale)
+
+        def make():
+            _export_file(target, ob, matrix, key, material, file,
+                         partial(target.files.grids, key, file))
+        target.part(("volume", key), (*stamp, file.stamp), reads, make)
+        return
+
+    def make():
+        write = _writer(ob)
+        if write is None:
+            return
+        with _scratch_file() as path:
+            write(path)
+            file = _Scratch(target, path)
+            _export_file(target, ob, matrix, key, material, file, file.grids)
+    target.part(("volume", key), (*stamp, ob.data.as_pointer()), reads, make)
 
 
-def export_mesh_volume(target, programs, ob, arrays, material, matrix, key):
+def _export_file(target, ob, matrix, key, material, file, grids_of):
+    program = program_for(target, material, file.infos)
+    if program is None:
+        target.reports.unsupported(f'Volume "{ob.name}"',
+                                   f'its material "{material.name}" has no volume shader.')
+        return
+    for name in program.unknown:
+        target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": no grid "{name}" in '
+                                            f"{file.path}; it reads as 0.")
+    for name in program.unused:
+        target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": no grid "{name}" in '
+                                            f"{file.path}; Principled Volume does without.")
+    if not program.grids:
+        target.reports.warn("GRID_UNKNOWN", f'Volume "{ob.name}": its material uses none of '
+                                            f"the grids in {file.path}; it is left out.")
+        return
+    grids = grids_of(program.grids)
+    if grids is None:
+        target.unfinished("volume", key)
+        return
+    for name in program.grids:
+        width = max(file.infos[name].file_dims)
+        if width > _WIDEST:
+            target.reports.warn(
+                "GRID_WIDE", f'Volume "{ob.name}": the grid "{name}" in {file.path} is {width} '
+                             f"voxels wide. All volumes get as coarse as its box is large: "
+                             f"are there stray voxels far away?")
+    scale = density_scale(matrix) if ob.data.render.space == 'OBJECT' else 1.0
+    target.put("volume", key, name=ob.name, program=program, grids=grids,
+               world_from_object=matrix, scale=scale)
+
+
+def export_mesh_volume(target, ob, arrays, material, matrix, key):
     """Puts one instance of a closed mesh filled with its material's medium."""
-    program = program_for(target, programs, material, ())
+    program = program_for(target, material, ())
     for name in program.unknown:
         target.reports.warn("GRID_UNKNOWN", f'"{ob.name}": a mesh has no grid "{name}"; it reads '
                                             f"as 0.")

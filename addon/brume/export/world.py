@@ -109,6 +109,11 @@ def export(target, world, reach):
     if world is None:
         target.put_world(color=(0.0, 0.0, 0.0))
         return
+    target.part(("world", compat.identity(world)), reach, nodes.identities(world),
+                lambda: _export(target, world, reach))
+
+
+def _export(target, world, reach):
 
     def warn(sentence):
         target.reports.unsupported(f'World "{world.name}"', sentence)

@@ -12,10 +12,12 @@ bl_info = {
 }
 
 from . import engine, panels, properties, session, viewport  # noqa: E402
+from .export import changes  # noqa: E402
 
 
 def register():
     properties.register()
+    changes.register()
     engine.register()
     panels.register()
 
@@ -23,6 +25,7 @@ def register():
 def unregister():
     panels.unregister()
     engine.unregister()
+    changes.unregister()
     properties.unregister()
     viewport.close()
     session.close()

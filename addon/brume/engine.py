@@ -99,7 +99,7 @@ class BrumeEngine(bpy.types.RenderEngine):
             seed=settings.seed, filter_width=scene_eval.render.filter_size,
             film_transparent=scene_eval.render.film_transparent,
             passes=sum(1 << number for number, *_ in passes),
-            progressive=not (self.is_preview or bpy.app.background))
+            progressive=not (self.is_preview or bpy.app.background), urgent=self.is_preview)
         return view, passes
 
     def _wait(self, job, view, result, passes):

@@ -95,7 +95,8 @@ class BRUME_PT_performance(_Rows, _RenderPanel, bpy.types.Panel):
 
     def draw(self, context):
         super().draw(context)
-        self.layout.prop(context.scene.render, "preview_pixel_size", text="Viewport Pixel Size")
+        self.layout.prop(context.scene.brume, "viewport_frame_time", text="Viewport Frame Time")
+        self.layout.prop(context.scene.render, "preview_pixel_size", text="Pixel Size")
         self.layout.prop(context.scene.render, "use_persistent_data", text="Persistent Data")
         self.layout.prop(context.scene.brume, "show_statistics")
 

@@ -55,6 +55,13 @@ class BrumeSettings(bpy.types.PropertyGroup):
         default=16, min=1, max=65536, soft_max=256,
         description="Samples a pixel that the rendered viewport goes on to while nothing "
                     "changes. The first picture after a change always has one")
+    viewport_frame_time: IntProperty(
+        name="Frame Time (ms)", update=_changed,
+        default=100, min=10, max=10000, soft_max=1000,
+        description="Milliseconds that a picture of the rendered viewport may take while something "
+                    "moves. Less is smoother and rougher: pixels grow, steps through volumes get "
+                    "longer, and lattices that must be made anew get coarser. At rest the picture "
+                    "always becomes as fine as it should be")
     medium_resolution: IntProperty(
         name="Volume Resolution", update=_changed,
         default=_DEFAULT["medium_resolution"], min=8, max=1024,

@@ -15,6 +15,7 @@ from .export.target import Target
 _lock = threading.Lock()
 _device = None
 _stages = {}
+_users = {}    # of a stage's name: how many hold it
 _closing = []  # threads that free what was dropped
 
 
@@ -31,10 +32,10 @@ last_stats = None  # RenderStats of the newest final render
 class Stage:
     """One scene of the library and what was exported to it; hold the lock while using it."""
 
-    def __init__(self, device):
+    def __init__(self, device, **target_options):
         self.lock = threading.Lock()
         self.scene = native.Scene(device)
-        self.target = Target(self.scene)
+        self.target = Target(self.scene, **target_options)
 
     def close(self):
         with self.lock:
@@ -50,13 +51,50 @@ def device():
         return _device
 
 
-def stage(name):
-    """The scene kept under a name: "final", "preview", or a viewport's own."""
+class Start(threading.Thread):
+    """Makes the device without keeping anybody waiting: a graphics driver may take its time."""
+
+    def __init__(self):
+        super().__init__(name="brume start")
+        self._error = None
+        self.start()
+
+    def run(self):
+        try:
+            device()
+        except native.BrumeError as error:
+            self._error = error
+
+    def done(self):
+        """Whether device() would answer at once; BrumeError if there can be no device."""
+        if self.is_alive():
+            return False
+        if self._error is not None:
+            raise self._error
+        return True
+
+
+def stage(name, make=Stage):
+    """The scene kept under a name: "final", "preview", or one of the viewport's; make(device)
+    makes it when it is first asked for."""
     owner = device()
     with _lock:
         if name not in _stages:
-            _stages[name] = Stage(owner)
+            _stages[name] = make(owner)
         return _stages[name]
+
+
+def join(name):
+    """Holds the stage of this name for one more user, who calls leave() in the end."""
+    _users[name] = _users.get(name, 0) + 1
+
+
+def leave(name):
+    """Frees the stage once nobody is left who joined it."""
+    _users[name] -= 1
+    if not _users[name]:
+        del _users[name]
+        drop(name, wait=False)
 
 
 def drop(name, wait=True):
@@ -89,10 +127,18 @@ def close():
 
 
 def stage_times(stats):
-    """The stages' times of native.Stats in words: "upload 1, medium 20, … ms"."""
-    times = (f"{native.library().stage_name(index).decode()} {stats.stages[index].wall_ms:.0f}"
-             for index in range(len(native.STAGES)))
-    return f"{', '.join(times)} ms"
+    """The times of the stages that ran in native.Stats, in words: "medium 20, … ms"."""
+    times = [(native.library().stage_name(index).decode(), stats.stages[index].wall_ms)
+             for index in range(len(native.STAGES))]
+    return ", ".join(f"{name} {ms:.0f}" for name, ms in times if ms >= 0.5) + " ms"
+
+
+def told(stats):
+    """native.Stats in words: the stages' times, the lattices' sizes, the memory."""
+    medium, light = (" x ".join(str(side) for side in dims)
+                     for dims in (stats.medium_dims, stats.transport_dims))
+    return (f"{stage_times(stats)} | volumes {medium}, light {light} | "
+            f"{stats.total_bytes / 2 ** 20:.0f} MiB")
 
 
 atexit.register(close)

@@ -1,96 +1,245 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rendered viewport: exports on changes, draws the newest finished picture, never waits."""
+"""The rendered viewport: shows the newest picture there is, and never waits for the next.
 
+Each 3D view has a View. All views of one scene and view layer share one native scene; a view that
+hides objects of its own (local view) has another. Blender tells of changes; they are exported when
+a picture is begun, so that many changes in a row cost one export. A change is followed by a look:
+a picture as rough as it must be to be there at once. When nothing changed for a moment, finer ones
+follow, and the last gathers samples. While a picture is under way a timer asks for it; when all
+is shown nothing runs any more.
+"""
+
+import time
 import traceback
 import weakref
+from typing import NamedTuple
 
+import bpy
 import numpy as np
 
-from . import native, session
-from .export import scene
+from . import compat, framing, native, session, trace
+from .export import changes, scene
+from .pace import STEP_FACTOR, Pace, SceneQuality
 from .properties import native_settings
 
-# Screen pixels along the side of one of the picture's, from the first look to the last.
-PIXEL_SIZES = (8, 4, 2, 1)
-# After a change the finest picture comes first that is likely to be there so soon, in seconds.
-FIRST_PICTURE_S = 0.1
-# The stages whose time grows with the pixels.
-_PIXEL_STAGES = [native.STAGES.index(name) for name in ("gbuffer", "shade", "march", "passes")]
+# How often pictures under way are asked for, in seconds.
+POLL_S = 0.01
+# What is at rest: nothing changed for so long. Finer lattices are begun later than finer pixels,
+# since a change that comes in between makes all of their work void.
+REST_S = 0.1
+SCENE_REST_S = 0.3
+# A look that was to be quick but takes so many times its time is broken off for a newer scene.
+_OVERDUE = 3.0
+# Stages whose products outlive a picture, and those of the picture itself.
+_SCENE_STAGES = [native.STAGES.index(name) for name in ("upload", "medium", "shadow", "transport")]
+_TRANSPORT = native.STAGES.index("transport")
+_VIEW_STAGES = [native.STAGES.index(name) for name in ("gbuffer", "shade", "march", "passes")]
 
 _views = weakref.WeakSet()
 
 
 def of(engine):
-    """The view of an engine object; Blender keeps one of these per 3D view, and the view ends
+    """The view of an engine object; Blender keeps one of these per region, and the view ends
     with it."""
     view = getattr(engine, "view", None)
     if view is None:
-        view = engine.view = View(f"viewport {engine.as_pointer()}")
+        view = engine.view = View(engine)
         _views.add(view)
     return view
 
 
+def views():
+    return list(_views)
+
+
 def close():
-    for view in list(_views):
+    for view in views():
         view.close()
+    if bpy.app.timers.is_registered(_poll):
+        bpy.app.timers.unregister(_poll)
 
 
-def clip_range(window_matrix):
-    """(near, far) of an OpenGL projection: what a 3D view says itself does not hold for the
-    camera that it looks through, nor for orthographic views, which also see behind their plane."""
-    scale, offset = window_matrix[2][2], window_matrix[2][3]
-    if window_matrix[3][3] == 0.0:
-        return offset / (scale - 1.0), offset / (scale + 1.0)
-    return (offset + 1.0) / scale, (offset - 1.0) / scale
+def _poll():
+    """Asks all views' jobs; ends when none is under way."""
+    waiting = [view.poll() for view in views()]
+    return POLL_S if any(waiting) else None
 
 
-def ladder(pixels, seconds, finest, samples):
-    """(pixel size, samples) of the pictures that follow one another while nothing changes.
-    seconds: what one sample of a pixel took; None: not known yet."""
-    sizes = [size for size in PIXEL_SIZES if size > finest] + [finest]
-    while seconds is not None and len(sizes) > 1 and (
-            seconds * pixels / sizes[1] ** 2 < FIRST_PICTURE_S):
-        del sizes[0]
-    steps = [(size, 1) for size in sizes]
-    while steps[-1][1] < samples:
-        steps.append((finest, min(4 * steps[-1][1], samples)))
-    return steps
+def _wake():
+    if not bpy.app.timers.is_registered(_poll):
+        bpy.app.timers.register(_poll, first_interval=POLL_S, persistent=True)
+
+
+# ------------------------------------------------------------------------------------------------
+# Scenes
+
+
+_HIDING = [f"show_object_viewport_{kind}" for kind in (
+    "mesh", "curve", "surf", "meta", "font", "curves", "pointcloud", "volume", "light", "empty")]
+
+
+def _stage_name(depsgraph, space):
+    """The same for all views that show the same objects."""
+    shared = f"viewport {compat.identity(depsgraph.scene)} {depsgraph.view_layer.name}"
+    shown = [getattr(space, name, True) for name in _HIDING]
+    if space.local_view is None and not space.use_local_collections and all(shown):
+        return shared, None
+    return f"{shared} {space.as_pointer()} {shown}", space
+
+
+class ViewportStage(session.Stage):
+    """A scene that views share, exported as it changes."""
+
+    def __init__(self, device, depsgraph):
+        super().__init__(device, background_loads=True)
+        self.changes = changes.Changes(depsgraph.scene, depsgraph.view_layer)
+        self.serial = 0     # counts the exports that changed anything
+        self.quality = SceneQuality()
+        self.reports = []   # sentences of the last export
+
+    @property
+    def outdated(self):
+        return self.changes.pending or self.target.arrived
+
+    def export(self, depsgraph, space, target_s):
+        """space: the view whose hidden objects are left out, None: none are."""
+        with trace.span("export"), self.lock:
+            scene.export(depsgraph, self.target, self.changes.take(), space)
+            reports = list(self.target.reports)
+        if self.target.sent_kinds:
+            self.serial += 1
+            self.quality.change(self.target.sent_kinds, target_s)
+        # Blender drops what a viewport's engine reports.
+        for _, sentence in reports:
+            if sentence not in self.reports:
+                print(f"Brume: warning: {sentence}", flush=True)
+        self.reports = [sentence for _, sentence in reports]
+
+
+# ------------------------------------------------------------------------------------------------
+# Views
+
+
+class Wish(NamedTuple):
+    """What a view must show: another one makes what is under way void."""
+    scene: int             # serial of the export
+    stage: str
+    framing: framing.Framing
+    finest: float          # screen pixels along the side of one of the picture's
+    samples: int
+    settings: tuple
+
+
+class Task(NamedTuple):
+    """One picture on the way to what is wished."""
+    size: float            # screen pixels along the side of one of the picture's
+    samples: int
+    look: bool             # the first, as rough as it must be
+    rough: bool            # whether it must be done again as it should be
+
+
+class Picture(NamedTuple):
+    serial: int
+    scene: int             # serial of the export that it shows
+    framing: framing.Framing
+    size: float
+    samples: int
+    pixels: np.ndarray     # (height, width, 4), scene-linear, premultiplied, from the bottom
 
 
 class View:
-    def __init__(self, name):
-        self.name = name
-        self.job = None
-        self.wanted = None   # what the picture must show: the scene's state, size, matrices
-        self.steps = []      # what is still to be rendered: pixel size, samples
-        self.turned = False  # whether nothing of what is wanted has been begun
-        self.first = False   # whether the job is the first of its steps
-        self.reports = []    # what the last export said
-        self.exports = 0
-        self.seconds = None  # what one sample of a pixel took last
-        self.picture = None
-        self.texture = None
+    def __init__(self, engine):
+        self.name = f"viewport {engine.as_pointer()}"
+        self.engine = weakref.ref(engine)
+        self.start = session.Start()
+        self.pace = Pace()
+        self.stage = None         # and the name that it is held by
+        self.stage_name = None
+        self.wish = None
+        self.changed_at = 0.0     # when the wish became another
+        self.task = None          # the last one begun for the wish; None: nothing was
+        self.job = None           # of the task
+        self.begun_at = 0.0
+        self.received = 0         # samples of the job's picture that was taken
+        self.due = None           # when to go on after a rest
+        self.notified = False     # whether a redraw was asked for and has not come yet
+        self.impatient = False    # whether the last look was broken off
         self.failed = False
+        self.picture = None
+        self.texture = None       # of the picture, on Blender's side
+        self.stats = None         # of the last job that ended
 
     def __del__(self):
         self.close()
 
+    @property
+    def settled(self):
+        """Whether all that is wished is shown."""
+        return (self.picture is not None and not self.notified and not self._waiting()
+                and not self.stage.outdated)
+
+    # -- called by Blender
+
     def update(self, engine, context, depsgraph):
-        self.failed = False
-        self._guard(self._export, engine, depsgraph)
-        engine.tag_redraw()
+        """Something changed; what, is collected in stage.changes. The next picture is begun before
+        Blender redraws, which takes a while too."""
+        with trace.span("update"):
+            self.failed = False
+            self._guard(self._advance, engine, context, depsgraph)
+            engine.tag_redraw()
+            if self._waiting():
+                _wake()
 
     def draw(self, engine, context, depsgraph):
-        if not self.failed:
-            self._guard(self._advance, engine, context, depsgraph)
-        if self.picture is not None:
-            self._show(context)
-        if self.job is not None:
-            engine.tag_redraw()
+        with trace.span("draw") as values:
+            self.notified = False
+            if not self.failed:
+                self._guard(self._advance, engine, context, depsgraph)
+            if self.picture is not None:
+                self._show(context.region)
+                values.update(view=self.name, picture=self.picture.serial,
+                              scene=self.picture.scene, pixel_size=self.picture.size,
+                              samples=self.picture.samples)
+            if self._waiting():
+                _wake()
+
+    def poll(self):
+        """On the timer: asks for a redraw where it is time for one. True while there is anything
+        to wait for."""
+        if self.notified or not self._waiting():
+            return False
+        if not self._news():
+            return True
+        try:
+            self.engine().tag_redraw()
+        except (AttributeError, ReferenceError):  # Blender has let go of the engine
+            return False
+        self.notified = True
+        return False
 
     def close(self):
         self._drop_job()
-        session.drop(self.name, wait=False)
+        self.due = None
+        if self.stage_name is not None:
+            session.leave(self.stage_name)
+            self.stage_name = self.stage = None
+
+    # -- what is under way
+
+    def _waiting(self):
+        return (self.start is not None or self.job is not None or self.due is not None
+                or self.stage is not None and self.stage.target.loading)
+
+    def _news(self):
+        """Whether a redraw would show or begin anything."""
+        if self.start is not None:
+            return not self.start.is_alive()
+        if self.stage.target.arrived or self.due is not None and time.perf_counter() >= self.due:
+            return True
+        if self.job is None:
+            return False
+        status = self.job.poll()
+        return status.ended or status.picture_samples > self.received
 
     def _guard(self, work, engine, *arguments):
         """Does the work; what goes wrong is said in the corner, and the scene's next change
@@ -104,90 +253,167 @@ class View:
             traceback.print_exc()
             sentence = f"{type(error).__name__}: {error}"
         self.failed = True
+        self.start = self.due = None
         self._drop_job()
         engine.update_stats("Brume", sentence)
 
     def _drop_job(self):
         if self.job is not None:
+            trace.note("job", self.begun_at, **self.task._asdict(), state=native.JOB_CANCELLED)
             self.job.close()
             self.job = None
 
-    def _export(self, engine, depsgraph):
-        stage = session.stage(self.name)
-        with stage.lock:
-            scene.export(depsgraph, stage.target)
-            reports = list(stage.target.reports)
-        self.exports += 1
-        # Blender drops what a viewport's engine reports.
-        for _, sentence in reports:
-            if sentence not in self.reports:
-                print(f"Brume: warning: {sentence}", flush=True)
-        self.reports = [sentence for _, sentence in reports]
+    def _hold_stage(self, depsgraph, space):
+        """The stage of what the view shows now. Returns the space whose objects it hides."""
+        name, own = _stage_name(depsgraph, space)
+        if name != self.stage_name:
+            stage = session.stage(name, lambda device: ViewportStage(device, depsgraph))
+            session.join(name)
+            self.close()
+            self.stage_name, self.stage = name, stage
+        return own
 
     def _advance(self, engine, context, depsgraph):
-        """Takes a finished picture and starts the next job."""
-        if self.job is not None and self.job.poll().ended:
-            self._take(engine, depsgraph)
-        region, settings = context.region, depsgraph.scene_eval.brume
-        finest = engine.get_preview_pixel_size(depsgraph.scene)
-        wanted = (self.exports, region.width, region.height, finest, settings.viewport_samples,
-                  *np.array(context.region_data.perspective_matrix).ravel().tolist())
-        if wanted != self.wanted:
-            # A first picture that is under way is let finish: cancelling it on every mouse
-            # move would show none while the view turns.
-            if self.job is not None and not self.first:
-                self.job.cancel()
-            self.wanted, self.turned = wanted, True
-            self.steps = ladder(region.width * region.height, self.seconds, finest,
-                                settings.viewport_samples)
-        if self.job is None and self.steps:
-            self._start(context, depsgraph, *self.steps.pop(0))
-            self.first, self.turned = self.turned, False
+        """Takes what is finished and begins what is next."""
+        if self.start is not None:
+            if not self.start.done():
+                return
+            self.start = None
+        now = time.perf_counter()
+        settings = depsgraph.scene_eval.brume
+        target_s = settings.viewport_frame_time / 1000
+        own_space = self._hold_stage(depsgraph, context.space_data)
+        self._receive()
+        if self.job is not None and self.task.look:
+            # A look is shown even if it is late: else none would be while the view turns. But one
+            # that is long overdue gives way to a newer scene, though not twice in a row.
+            if (not self.stage.outdated or self.impatient
+                    or now - self.begun_at < _OVERDUE * target_s):
+                return
+            self._drop_job()
+            self.impatient = True
+        if self.stage.outdated:
+            self.stage.export(depsgraph, own_space, target_s)
+        wish = self._wish(engine, context, depsgraph)
+        if wish != self.wish:
+            self._drop_job()
+            self.wish, self.changed_at, self.task = wish, now, None
+        if self.job is None and wish.framing is None:
+            self.picture = None  # a border outside of the region
+        elif self.job is None:
+            self._begin_next(depsgraph, now, target_s)
+        self._tell(engine, settings)
 
-    def _take(self, engine, depsgraph):
-        job, self.job = self.job, None
-        try:
-            status = job.poll()
-            job.check(status)
-            if status.state == native.JOB_DONE:
-                self.picture, self.texture = job.read(0), None
-                stats = job.stats()
-                spent = sum(stats.stages[stage].wall_ms for stage in _PIXEL_STAGES) / 1000
-                self.seconds = spent / (job.width * job.height * stats.samples)
-                self._tell(engine, depsgraph, stats)
-        finally:
-            job.close()
+    def _wish(self, engine, context, depsgraph):
+        scene_eval = depsgraph.scene_eval
+        settings = scene_eval.brume
+        return Wish(self.stage.serial, self.stage_name, framing.of(context, scene_eval),
+                    engine.get_preview_pixel_size(depsgraph.scene), settings.viewport_samples,
+                    (bytes(native_settings(settings)), settings.seed,
+                     scene_eval.render.filter_size, scene_eval.render.film_transparent))
 
-    def _tell(self, engine, depsgraph, stats):
-        """In the view's corner: the first warning, and the stages' times if wanted."""
-        said = [f"{len(self.reports)} warnings, the first: {self.reports[0]}" if self.reports[1:]
-                else sentence for sentence in self.reports[:1]]
-        if depsgraph.scene_eval.brume.show_statistics:
-            said += [f"{stats.samples} samples", session.stage_times(stats)]
+    def _next_task(self, target_s):
+        wish, quality, last = self.wish, self.stage.quality, self.task
+        width, height = wish.framing.part[2:]
+        if last is None:
+            size = self.pace.choose(width * height, wish.finest, target_s)
+            return Task(size, 1, True, size > wish.finest or not quality.full)
+        if last.size / 2 > wish.finest:
+            return Task(last.size / 2, 1, False, True)
+        if last.rough or last.samples < wish.samples:
+            return Task(wish.finest, wish.samples, False, False)
+        return None
+
+    def _begin_next(self, depsgraph, now, target_s):
+        task, self.due = self._next_task(target_s), None
+        if task is None:
+            return
+        if not task.look:
+            due = self.changed_at + (REST_S if self.stage.quality.full else SCENE_REST_S)
+            if now < due:
+                self.due = due
+                return
+        wish, scene_eval = self.wish, depsgraph.scene_eval
+        settings = native_settings(scene_eval.brume)
+        if task.rough and task.size > wish.finest:
+            settings.step *= STEP_FACTOR
+        if task.look:
+            self.stage.quality.apply(settings)
+        view = native.View(
+            width=max(round(wish.framing.part[2] / task.size), 1),
+            height=max(round(wish.framing.part[3] / task.size), 1),
+            view_from_world=native.matrix(np.reshape(wish.framing.view_from_world, (4, 4))),
+            clip_from_view=native.matrix(np.reshape(wish.framing.clip_from_view, (4, 4))),
+            clip_near=wish.framing.clip_near, clip_far=wish.framing.clip_far,
+            samples=task.samples, seed=scene_eval.brume.seed, passes=1,
+            filter_width=scene_eval.render.filter_size,
+            film_transparent=scene_eval.render.film_transparent,
+            progressive=task.samples > 1, urgent=task.look)
+        with self.stage.lock:
+            self.job = self.stage.scene.render(settings, view)
+        self.task, self.begun_at, self.received = task, now, 0
+
+    def _receive(self):
+        """Takes the job's newest picture, and lets a job go that ended."""
+        if self.job is None:
+            return
+        job, status = self.job, self.job.poll()
+        if status.picture_samples > self.received:
+            self.received = status.picture_samples
+            self.picture = Picture(self.picture.serial + 1 if self.picture else 1, self.wish.scene,
+                                   self.wish.framing, self.task.size, self.received, job.read(0))
+            self.texture = None
+            self.impatient = False
+            if not self.task.look:
+                self.stage.quality.rest()
+        if status.ended:
+            trace.note("job", self.begun_at, **self.task._asdict(), state=status.state)
+            self.job = None
+            try:
+                job.check(status)
+                if status.state == native.JOB_DONE:
+                    self._learn(job.stats(), job.width * job.height)
+            finally:
+                job.close()
+
+    def _learn(self, stats, pixels):
+        self.stats = stats
+        scene_s, view_s = (sum(stats.stages[stage].wall_ms for stage in stages) / 1000
+                           for stages in (_SCENE_STAGES, _VIEW_STAGES))
+        if self.task.look:
+            self.stage.quality.learn(scene_s)
+        elif stats.stages[_TRANSPORT].wall_ms > 0:
+            self.stage.quality.learn_full(scene_s)
+        if self.task.samples == 1:
+            self.pace.learn(pixels, view_s)
+
+    def _tell(self, engine, settings):
+        """In the view's corner: warnings, and what the picture took if wanted."""
+        said = self.stage.reports[:1]
+        if self.stage.reports[1:]:
+            said = [f"{len(self.stage.reports)} warnings, the first: {said[0]}"]
+        if self.stage.target.loading:
+            said.append("loading volumes")
+        if settings.show_statistics and self.picture is not None:
+            said.append(f"Sample {self.picture.samples}/{settings.viewport_samples}")
+            if self.picture.size > 1:
+                said.append(f"pixels of {self.picture.size:g}")
+            if self.stats is not None:
+                said.append(session.told(self.stats))
         engine.update_stats("", " | ".join(said))
 
-    def _start(self, context, depsgraph, pixel_size, samples):
-        region, space = context.region, context.region_data
-        scene_eval = depsgraph.scene_eval
-        near, far = clip_range(space.window_matrix)
-        view = native.View(
-            width=max(region.width // pixel_size, 1), height=max(region.height // pixel_size, 1),
-            view_from_world=native.matrix(space.view_matrix),
-            clip_from_view=native.matrix(space.window_matrix), clip_near=near, clip_far=far,
-            samples=samples, seed=scene_eval.brume.seed, passes=1,
-            filter_width=scene_eval.render.filter_size,
-            film_transparent=scene_eval.render.film_transparent)
-        stage = session.stage(self.name)
-        with stage.lock:
-            self.job = stage.scene.render(native_settings(scene_eval.brume), view)
-
-    def _show(self, context):
+    def _show(self, region):
+        """Draws the picture where it belongs, stretched if the region's size changed since."""
         import gpu  # not usable, and not needed, in background
         from gpu_extras.presets import draw_texture_2d
-        height, width = self.picture.shape[:2]
         if self.texture is None:
-            data = gpu.types.Buffer('FLOAT', self.picture.size, self.picture.reshape(-1))
+            height, width = self.picture.pixels.shape[:2]
+            data = gpu.types.Buffer('FLOAT', self.picture.pixels.size,
+                                    self.picture.pixels.reshape(-1))
             self.texture = gpu.types.GPUTexture((width, height), format='RGBA16F', data=data)
+        (full_width, full_height), (x, y, width, height) = self.picture.framing[:2]
+        stretch_x, stretch_y = region.width / full_width, region.height / full_height
         gpu.state.blend_set('ALPHA_PREMULT')
-        draw_texture_2d(self.texture, (0, 0), context.region.width, context.region.height)
+        draw_texture_2d(self.texture, (x * stretch_x, y * stretch_y), width * stretch_x,
+                        height * stretch_y)
         gpu.state.blend_set('NONE')

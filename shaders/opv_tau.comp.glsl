@@ -30,9 +30,11 @@ void main()
         return;
     vec3 p = frame.lattice_lower.xyz + vec3(node) * frame.lattice_lower.w;
     gpu_light light = lights[stage.offset.x];
-    vec3 tau = depth_towards(light, light.position.xyz, p);
+    vec3 tau;
     int count = stage.offset.y;
-    if (count > 1) {
+    if (count == 1) {
+        tau = depth_towards(light, light.position.xyz, p);
+    } else {
         // -log of the mean transmittance, kept from underflow by the smallest depth.
         vec3 depths[8];
         vec3 least = vec3(1e30);

@@ -238,8 +238,8 @@ static void write_instance(struct gpu_instance *out, const float *world_from_obj
 
 static void add_draws(struct geometry *geometry, const struct snapshot *snapshot,
                       const struct mesh_block *mesh, const struct gpu_mesh *gpu_mesh,
-                      const struct instances_block *set, uint32_t first_instance,
-                      uint32_t instance_count)
+                      const struct instances_block *set, const float lower[3],
+                      const float upper[3], uint32_t first_instance, uint32_t instance_count)
 {
     const struct table *materials = &snapshot->tables[BRUME_KIND_MATERIAL];
     for (uint32_t slot = 0; slot < mesh->slot_count; ++slot) {
@@ -253,6 +253,8 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
                               .first_instance = first_instance,
                               .instance_count = instance_count,
                               .visibility = set->visibility};
+        memcpy(draw->lower, lower, sizeof draw->lower);
+        memcpy(draw->upper, upper, sizeof draw->upper);
         const struct entry *entry = table_find(materials, mesh->materials[slot]);
         if (!entry)
             continue;
@@ -268,14 +270,17 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
     }
 }
 
-/* False where finite vertices and a finite matrix make a place that no number holds. */
-static int add_bounds(struct geometry *geometry, const struct mesh_block *mesh, const float *matrix)
+/* To the scene's and the set's. False where finite vertices and a finite matrix make a place that no
+ * number holds. */
+static int add_bounds(struct geometry *geometry, const struct mesh_block *mesh, const float *matrix,
+                      float set_lower[3], float set_upper[3])
 {
     float lower[3], upper[3];
     mat4_bounds(matrix, mesh->lower, mesh->upper, lower, upper);
     for (int i = 0; i < 3; ++i)
         if (!(fabsf(lower[i]) < FARTHEST && fabsf(upper[i]) < FARTHEST))
             return 0;
+    grow(set_lower, set_upper, lower, upper);
     grow(geometry->lower, geometry->upper, lower, upper);
     if (!is_flat(mesh))
         grow(geometry->solid_lower, geometry->solid_upper, lower, upper);
@@ -319,9 +324,11 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
         if (mesh->triangle_count == 0)
             continue;
         const uint32_t first = next;
+        float lower[3] = {INFINITY, INFINITY, INFINITY};
+        float upper[3] = {-INFINITY, -INFINITY, -INFINITY};
         for (uint32_t k = 0; k < set->count; ++k) {
             const float *matrix = set->world_from_object + 16 * (size_t)k;
-            if (!add_bounds(geometry, mesh, matrix))
+            if (!add_bounds(geometry, mesh, matrix, lower, upper))
                 continue;
             write_instance(&instances[next], matrix, set->visibility);
             numbers[next] = next;
@@ -333,7 +340,7 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
                      set->count - (next - first), set->count, mesh->name);
         if (next == first)
             continue;
-        add_draws(geometry, snapshot, mesh, gpu_mesh, set, first, next - first);
+        add_draws(geometry, snapshot, mesh, gpu_mesh, set, lower, upper, first, next - first);
         geometry->triangle_count += mesh->triangle_count * (next - first);
     }
     if (result == BRUME_OK)
@@ -399,6 +406,34 @@ brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,
     return sync_instances(gpu, geometry, snapshot, control);
 }
 
+/* Whether all of the draw lies beyond one of the clip volume's planes; five of six of a lamp's maps see
+ * nothing of it, and vertices are what a CPU spends its time on. */
+static int is_outside(const struct draw *draw, const mat4 *clip_from_world)
+{
+    const float *m = clip_from_world->m;
+    uint32_t beyond_all = 63;
+    for (int corner = 0; corner < 8; ++corner) {
+        const float x = corner & 1 ? draw->upper[0] : draw->lower[0];
+        const float y = corner & 2 ? draw->upper[1] : draw->lower[1];
+        const float z = corner & 4 ? draw->upper[2] : draw->lower[2];
+        float clip[4], size[4]; /* sizes of the sums, for what rounding may do to them */
+        for (int row = 0; row < 4; ++row) {
+            const float parts[4] = {m[row] * x, m[4 + row] * y, m[8 + row] * z, m[12 + row]};
+            clip[row] = parts[0] + parts[1] + parts[2] + parts[3];
+            size[row] = fabsf(parts[0]) + fabsf(parts[1]) + fabsf(parts[2]) + fabsf(parts[3]);
+        }
+        uint32_t beyond = 0;
+        for (int row = 0; row < 3; ++row) {
+            const float slack = 1e-5f * (size[row] + size[3]);
+            const float least = row == 2 ? 0.0f : -clip[3]; /* depth goes from 0 to w */
+            beyond |= (uint32_t)(clip[row] < least - slack) << (2 * row);
+            beyond |= (uint32_t)(clip[row] > clip[3] + slack) << (2 * row + 1);
+        }
+        beyond_all &= beyond;
+    }
+    return beyond_all != 0;
+}
+
 brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const struct gpu_draw *stage,
                            uint32_t visibility, enum geometry_pass pass)
 {
@@ -424,7 +459,8 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
     for (uint32_t i = 0; i < geometry->draw_count; ++i) {
         const struct draw *draw = &geometry->draws[i];
         if ((draw->visibility & visibility) != visibility ||
-            (pass == GEOMETRY_TINT && !draw->tinted))
+            (pass == GEOMETRY_TINT && !draw->tinted) ||
+            is_outside(draw, &stage->clip_from_world))
             continue;
         glVertexArrayVertexBuffer(geometry->vertex_array, 0, draw->corners, 0, 32);
         glBindTextureUnit(SLOT_MATERIAL_BASE, draw->base_image);

@@ -55,36 +55,41 @@ class Changes:
 
     def _look_at_images(self):
         before, self._images = self._images, _image_states()
-        self.add({name: 0 for name, state in self._images.items() if before.get(name) != state})
+        self.add({name: 0 for name in before.keys() | self._images.keys()
+                  if before.get(name) != self._images.get(name)})
 
 
 def _image_states():
-    """What the user can change on an image; its size would load it."""
+    """What can be changed on an image by name; asking for its size would load it."""
     return {compat.identity(image): (
-        image.filepath, image.source, image.alpha_mode, image.colorspace_settings.name,
-        image.is_dirty, image.generated_type, image.generated_width, image.generated_height,
-        tuple(image.generated_color)) for image in bpy.data.images}
+        image.as_pointer(), image.filepath, image.source, image.alpha_mode, image.is_dirty,
+        image.colorspace_settings.name, image.generated_type, image.generated_width,
+        image.generated_height, tuple(image.generated_color)) for image in bpy.data.images}
 
 
-def _owner(tree):
-    """The material, world or lamp that a node tree is part of: all such trees have one name."""
-    return next((owner for owners in (bpy.data.materials, bpy.data.worlds, bpy.data.lights)
-                 for owner in owners if owner.node_tree == tree), tree)
+def _owners():
+    """Of the node trees that are part of a material, world or lamp: these have all one name."""
+    return {owner.node_tree: owner for owners in (bpy.data.materials, bpy.data.worlds,
+                                                  bpy.data.lights)
+            for owner in owners if owner.node_tree}
 
 
 def _updates(depsgraph):
-    found = {}
+    found, owners = {}, None
     for update in depsgraph.updates:
         datablock = update.id.original
         if datablock.is_embedded_data and isinstance(datablock, bpy.types.NodeTree):
-            datablock = _owner(datablock)
+            owners = owners or _owners()
+            datablock = owners.get(datablock, datablock)
         flags = (update.is_updated_geometry * GEOMETRY | update.is_updated_transform * TRANSFORM
                  | update.is_updated_shading * SHADING)
         name = compat.identity(datablock)
         found[name] = found.get(name, 0) | flags
     if depsgraph.id_type_updated('IMAGE'):
         # Of painting no more is known; what was painted on is not saved yet.
-        found.update({compat.identity(image): 0 for image in bpy.data.images if image.is_dirty})
+        for image in bpy.data.images:
+            if image.is_dirty:
+                found.setdefault(compat.identity(image), 0)
     return found
 
 

@@ -234,7 +234,7 @@ void main()
         return;
     view_ray ray = pixel_ray(pixel);
     vec4 normal_depth = texelFetch(gbuffer_normal, pixel, 0);
-    bool hit = normal_depth.w > 0.0;
+    bool hit = normal_depth.w > NO_DEPTH;
     float t_near = frame.clip.x * ray.stretch;
     float t_far = hit ? normal_depth.w * ray.stretch : frame.clip.y * ray.stretch;
 

@@ -131,7 +131,7 @@ void main()
         return;
     vec4 normal_depth = texelFetch(gbuffer_normal, pixel, 0);
     vec3 radiance = vec3(0.0);
-    if (normal_depth.w > 0.0) {
+    if (normal_depth.w > NO_DEPTH) {
         view_ray ray = pixel_ray(pixel);
         vec4 diffuse = texelFetch(gbuffer_diffuse, pixel, 0);
         surface s;

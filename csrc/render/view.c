@@ -249,10 +249,11 @@ brume_result view_gbuffer(struct gpu *gpu, struct view_targets *targets, struct 
                           const brume_view *view, uint32_t sample)
 {
     static const float zero[4], white[4] = {1.0f, 1.0f, 1.0f, 1.0f};
+    static const float nothing[4] = {0.0f, 0.0f, 0.0f, NO_DEPTH};
     glBindFramebuffer(GL_FRAMEBUFFER, targets->framebuffer);
     glViewport(0, 0, view->width, view->height);
     for (int i = 0; i < 4; ++i)
-        glClearNamedFramebufferfv(targets->framebuffer, GL_COLOR, i, zero);
+        glClearNamedFramebufferfv(targets->framebuffer, GL_COLOR, i, i ? zero : nothing);
     glClearNamedFramebufferfv(targets->framebuffer, GL_DEPTH, 0, zero);
     const struct gpu_draw stage = camera_draw(view, sample);
     TRY(geometry_draw(gpu, geometry, &stage, BRUME_VISIBLE_CAMERA, GEOMETRY_GBUFFER));

@@ -47,6 +47,11 @@ vec3 lamp_seen(gpu_light light, view_ray ray, out float t)
 vec3 lamps_seen(view_ray ray, float t_near, float t_far, bool hit)
 {
     vec3 sum = vec3(0.0);
+    if (t_near < 0.0) { // an orthographic view: what is behind the eye is before the near plane
+        ray.origin += ray.direction * t_near;
+        t_far -= t_near;
+        t_near = 0.0;
+    }
     for (uint i = 0u; i < frame.counts.x; ++i) {
         gpu_light light = lights[i];
         if ((light.samples.w & LIGHT_CAMERA_VISIBLE) == 0u)

@@ -13,6 +13,10 @@ typedef struct uvec4 { uint32_t x, y, z, w; } uvec4;
 typedef struct mat4 { float m[16]; } mat4;
 #endif
 
+/* Depth of a pixel of the G-buffer that sees no surface. Orthographic views see behind their eye, at
+ * depths below 0. */
+#define NO_DEPTH -1e30f
+
 /* Group sizes */
 #define GROUP_PIXELS 8   /* 8 x 8 x 1: a view pass */
 #define GROUP_CELLS 4    /* 4 x 4 x 4: a lattice pass */

@@ -21,9 +21,9 @@ def identity(datablock):
     original = datablock.original
     uid = getattr(original, "session_uid", None)
     if uid is not None:
-        return f"{original.bl_rna.identifier}:{uid}"
-    library = original.library.filepath if original.library else ""
-    return f"{original.bl_rna.identifier}:{original.name_full}:{library}"
+        return f"{type(original).__name__}:{uid}"
+    library = original.library
+    return f"{type(original).__name__}:{original.name_full}:{library.filepath if library else ''}"
 
 
 def has_use_nodes():

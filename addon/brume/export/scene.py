@@ -73,11 +73,9 @@ class _Export:
         self.things = {}     # by object and data
         self.shown = {}      # by object: whether the space shows it
         self.slots = {}      # by material: _Material
+        self.drawn = set()   # those on a mesh
         self.shared = {}     # by mesh: its evaluated one
         self.numbers = {}    # how many shapes came up of one object and mesh
-
-    def warn(self, ob, sentence):
-        self.target.reports.unsupported(f'Object "{ob.name}"', sentence)
 
     def run(self):
         instances = self.depsgraph.object_instances
@@ -125,7 +123,8 @@ class _Export:
         if ob.type == 'MESH':
             return self.surface(instance, ob)
         if ob.type not in _UNSEEN:
-            self.warn(ob, f"objects of type {ob.type} are not shown.")
+            self.target.reports.unsupported(f'Object "{ob.name}"',
+                                            f"objects of type {ob.type} are not shown.")
         return _Thing()
 
     def light(self, instance, ob, matrix):
@@ -146,11 +145,15 @@ class _Export:
     # -- surfaces
 
     def surface(self, instance, ob):
-        slots = [self.slot(m) for m in self.materials(ob)]
-        shape, reads = self.shape(instance, ob, slots)
+        # Whether the data is the object's, not what modifiers or curves made beside it.
+        own = ob.original.evaluated_get(self.depsgraph).data == ob.data
+        slots = [self.slot(m) for m in self.materials(ob, own)]
+        shape, reads = self.shape(instance, ob, own, slots)
         if shape.mesh is not None:
             for slot in slots:
-                material.export(self.target, slot.material)
+                if slot not in self.drawn:
+                    self.drawn.add(slot)
+                    material.export(self.target, slot.material)
         each = None
         if shape.medium is not None:
             medium = slots[shape.medium]
@@ -182,13 +185,9 @@ class _Export:
             bits |= native.VISIBLE_HOLDOUT
         return bits
 
-    def is_own(self, ob):
-        """Whether the data is the object's, not what modifiers or curves made beside it."""
-        return ob.original.evaluated_get(self.depsgraph).data == ob.data
-
-    def materials(self, ob):
+    def materials(self, ob, own):
         """The material of each slot; never empty. What modifiers or curves made has its own."""
-        found = ([slot.material for slot in ob.material_slots] if self.is_own(ob)
+        found = ([slot.material for slot in ob.material_slots] if own
                  else list(ob.data.materials)) or [None]
         return [self.override] * len(found) if self.override else found
 
@@ -201,10 +200,10 @@ class _Export:
             self.slots[found] = _Material(found, name, surface, medium)
         return self.slots[found]
 
-    def shape(self, instance, ob, slots):
+    def shape(self, instance, ob, own, slots):
         """What the object's data becomes, and the identities of what that is made of."""
-        name, reads = identity(ob.data), {identity(ob.data)}
-        kinds, own = tuple(slot[1:] for slot in slots), self.is_own(ob)
+        name = identity(ob.data)
+        reads, kinds = {name}, tuple(slot[1:] for slot in slots)
         if own and not ob.modifiers and self.shared.setdefault(name, ob.data) == ob.data:
             # Objects without modifiers share their evaluated mesh.
             label, part = ob.data.name, ("mesh", name, kinds)
@@ -224,11 +223,13 @@ class _Export:
         medium, *others = [i for i, slot in enumerate(slots) if slot.volume] or [None]
         for other in sorted({slots[i].material.name for i in others
                              if slots[i].material != slots[medium].material}):
-            self.warn(ob, f'the volume of material "{other}" is not shown, since an object has '
-                          f'one, and that is of "{slots[medium].material.name}".')
+            self.target.reports.unsupported(
+                f'"{name}"', f'the volume of material "{other}" is not shown, since an object has '
+                             f'one, and that is of "{slots[medium].material.name}".')
         for system in ob.particle_systems:
             if system.settings.type == 'HAIR' and system.settings.render_type == 'PATH':
-                self.warn(ob, f'the hair of "{system.name}" is not shown.')
+                self.target.reports.unsupported(
+                    f'"{name}"', f'the hair of "{system.name}" is not shown.')
         nothing = _Shape(None, None, None, next(_serial))
         if medium is None and fluid.gas_domain(ob) and all(slot.material is None for slot in slots):
             return nothing  # a domain without a material is no grey box

@@ -30,7 +30,8 @@ class Reports:
         self._entries.setdefault((id, sentence))
 
     def extend(self, others):
-        self._entries.update(dict.fromkeys(others))
+        if others._entries:
+            self._entries.update(others._entries)
 
     def unsupported(self, owner, what):
         """owner: 'Material "Fog"'; what: the thing that is not shown, and what stands for it."""

@@ -514,6 +514,7 @@ BRUME_API brume_result brume_render(brume_scene *scene, const brume_settings *se
 BRUME_API brume_result brume_job_poll(const brume_job *job, brume_job_status *out);
 /* Waits until the job ends or the time is over (milliseconds, below 0: for ever). */
 BRUME_API brume_result brume_job_wait(brume_job *job, int32_t timeout_ms, brume_job_status *out);
+/* A job that waits ends at once, one that runs at its next check. */
 BRUME_API void brume_job_cancel(brume_job *job);
 BRUME_API const char *brume_job_error(const brume_job *job); /* empty unless failed */
 /* Warning number index of the job: its id ("LATTICE_COARSER") and sentence, owned by the job. */

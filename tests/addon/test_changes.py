@@ -182,6 +182,28 @@ def test_only_what_changed_is_read(studio, viewport, monkeypatch):
     assert reads == ["Wall"]
 
 
+@pytest.mark.parametrize("modified", [False, True])
+def test_edit_mode(studio, viewport, modified):
+    if modified:
+        studio.wall.modifiers.new("Triangulate", 'TRIANGULATE')
+    bpy.context.view_layer.objects.active = studio.wall
+    bpy.ops.object.mode_set(mode='EDIT')
+    viewport.export()
+    before = viewport.recorder.named("mesh", "Wall")["positions"]
+    assert before.shape == (8, 3)
+    bpy.ops.mesh.select_all(action='SELECT')
+    bpy.ops.transform.translate(value=(0, 0, 3))
+    bpy.context.view_layer.update()
+    assert viewport.export() == ["mesh"]
+    after = viewport.recorder.named("mesh", "Wall")["positions"]
+    np.testing.assert_allclose(after, before + (0, 0, 3))
+    assert not differences(viewport)
+    bpy.ops.object.mode_set(mode='OBJECT')
+    bpy.context.view_layer.update()
+    viewport.export()
+    assert not differences(viewport)
+
+
 def test_kinds_that_were_sent(studio, viewport):
     viewport.export()
     assert viewport.target.sent_kinds == {"mesh", "instances", "material", "image", "light",

@@ -64,7 +64,8 @@ def _image_states():
     return {compat.identity(image): (
         image.as_pointer(), image.filepath, image.source, image.alpha_mode, image.is_dirty,
         image.colorspace_settings.name, image.generated_type, image.generated_width,
-        image.generated_height, tuple(image.generated_color)) for image in bpy.data.images}
+        image.generated_height, tuple(image.generated_color))
+        for image in bpy.data.images if image.source != 'VIEWER'}  # renders' results
 
 
 def _owners():

@@ -32,6 +32,17 @@ def read(mesh):
     }
 
 
+def read_of(ob):
+    """As read(), of an evaluated object's mesh, in edit mode too."""
+    if not ob.data.is_editmode:
+        return read(ob.data)
+    # The mesh that is being edited is not in the evaluated one, unless modifiers brought it there.
+    try:
+        return read(ob.to_mesh())
+    finally:
+        ob.to_mesh_clear()
+
+
 def only_slots(arrays, slots):
     """The arrays with the triangles of these slots alone; None if that leaves none."""
     kept = np.isin(arrays["triangle_slots"], list(slots))

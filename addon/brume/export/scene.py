@@ -71,7 +71,6 @@ class _Export:
         self.override = depsgraph.view_layer_eval.material_override
         self.view_layer = depsgraph.view_layer
         self.things = {}     # by object and data
-        self.shown = {}      # by object: whether the space shows it
         self.slots = {}      # by material: _Material
         self.drawn = set()   # those on a mesh
         self.shared = {}     # by mesh: its evaluated one
@@ -81,9 +80,12 @@ class _Export:
         instances = self.depsgraph.object_instances
         matrices = _matrices(instances)
         for index, instance in enumerate(instances):
-            if not instance.show_self or self.space and not self.is_shown(instance):
+            if not instance.show_self:
                 continue
             ob = instance.object
+            # Only the evaluated object knows of local views; an instance has its instancer's.
+            if self.space and not ob.visible_in_viewport_get(self.space):
+                continue
             key = ob.original, ob.data
             try:
                 thing = self.things.get(key)
@@ -106,14 +108,6 @@ class _Export:
                 block = matrices[indices]
                 self.target.put("instances", key_of(key, visibility), block.tobytes(), mesh=key,
                                 world_from_object=block, visibility=visibility)
-
-    def is_shown(self, instance):
-        """Whether the view shows it: an instance is as its instancer."""
-        ob = (instance.parent if instance.is_instance else instance.object).original
-        shown = self.shown.get(ob)
-        if shown is None:
-            shown = self.shown[ob] = ob.visible_in_viewport_get(self.space)
-        return shown
 
     def thing(self, instance, ob):
         if ob.type == 'LIGHT':
@@ -202,11 +196,13 @@ class _Export:
 
     def shape(self, instance, ob, own, slots):
         """What the object's data becomes, and the identities of what that is made of."""
-        name = identity(ob.data)
+        # In edit mode the evaluated mesh does not know its original.
+        data = ob.original.data if own and ob.original.type == 'MESH' else ob.data
+        name = identity(data)
         reads, kinds = {name}, tuple(slot[1:] for slot in slots)
         if own and not ob.modifiers and self.shared.setdefault(name, ob.data) == ob.data:
             # Objects without modifiers share their evaluated mesh.
-            label, part = ob.data.name, ("mesh", name, kinds)
+            label, part = data.name, ("mesh", name, kinds)
         else:
             owner = identity(ob)
             number = self.numbers[owner, name] = self.numbers.get((owner, name), 0) + 1
@@ -233,7 +229,7 @@ class _Export:
         nothing = _Shape(None, None, None, next(_serial))
         if medium is None and fluid.gas_domain(ob) and all(slot.material is None for slot in slots):
             return nothing  # a domain without a material is no grey box
-        arrays = mesh.read(ob.data)
+        arrays = mesh.read_of(ob)
         if arrays is None:
             return nothing
         # A slot number beyond the slots means the last one, as in Blender.

@@ -276,11 +276,18 @@ static brume_result work_passes(struct run *run)
     return context_check("reading the picture");
 }
 
+/* Whether a sample takes so long that others should have their turn within it. */
+static bool is_long(const struct run *run)
+{
+    const brume_view *view = &run->request->view;
+    return run->gpu->context.info.software && view->width * view->height > SOFTWARE_PIXELS;
+}
+
 /* The last row of this step, and one. */
 static int last_row(const struct run *run)
 {
     const brume_view *view = &run->request->view;
-    if (!run->gpu->context.info.software)
+    if (!is_long(run))
         return view->height;
     const int groups = SOFTWARE_PIXELS / view->width / GROUP_PIXELS;
     const int end = run->request->row + (groups ? groups : 1) * GROUP_PIXELS;
@@ -306,6 +313,7 @@ static brume_result bind_view(struct run *run, int end)
 
 static void count_sample(struct render_request *request)
 {
+    request->drawn = false;
     request->row = 0;
     ++request->sample;
     pthread_mutex_lock(&request->control->mutex);
@@ -317,14 +325,18 @@ static brume_result step_view(struct run *run, bool *more)
 {
     struct render_request *request = run->request;
     const brume_view *view = &request->view;
-    if (request->row == 0)
+    *more = true;
+    if (!request->drawn) {
         TRY(stage_timed(run, BRUME_STAGE_GBUFFER, work_gbuffer));
+        request->drawn = true;
+        if (is_long(run))
+            return BRUME_OK;
+    }
     const int end = last_row(run);
     TRY(bind_view(run, end));
     TRY(stage_timed(run, BRUME_STAGE_SHADE, work_shade));
     TRY(stage_timed(run, BRUME_STAGE_MARCH, work_march));
     request->row = end;
-    *more = true;
     if (end < view->height)
         return BRUME_OK;
     count_sample(request);

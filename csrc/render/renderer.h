@@ -48,6 +48,7 @@ struct render_request {
     /* How far it is. */
     struct view_targets *targets; /* from the first step to the last */
     uint32_t sample;
+    bool drawn; /* the sample's G-buffer */
     int row;
     uint64_t products;   /* of the scene's stages, as its warnings tell of them */
     double next_picture;

@@ -178,6 +178,42 @@ static void pictures_get_better(void **state)
     brume_scene_destroy(scene);
 }
 
+/* On a CPU a picture of this size is rendered some rows at a time: what others do to the scene's
+ * products between two parts of a sample leaves no trace. */
+static void parts_of_samples(void **state)
+{
+    (void)state;
+    brume_scene *scene = fog_scene();
+    brume_view view = orthographic_view(origin, down, 2.0f, 3.0f, 288);
+    brume_job_status status;
+    view.samples = 2;
+    brume_job *job = render(scene, &settings, &view);
+    float *alone = read_pass(job, &view, BRUME_PASS_COMBINED);
+    brume_job_release(job);
+
+    brume_settings finer = settings;
+    finer.medium_resolution = 12;
+    finer.shadow_resolution = 24;
+    brume_view small = orthographic_view(origin, down, 2.0f, 3.0f, 16);
+    small.samples = 16;
+    brume_job *other;
+    assert_ok(brume_render(scene, &finer, &small, &other));
+    assert_ok(brume_render(scene, &settings, &view, &job));
+    assert_ok(brume_job_wait(job, -1, &status));
+    assert_int_equal(status.state, BRUME_JOB_DONE);
+    brume_stats stats;
+    assert_ok(brume_job_stats(job, &stats));
+    /* The fog's extinction was made again for at least one later part. */
+    assert_true(stats.lights_propagated > 1);
+    float *beside = read_pass(job, &view, BRUME_PASS_COMBINED);
+    assert_memory_equal(beside, alone, 288 * 288 * 4 * sizeof *alone);
+    free(beside);
+    free(alone);
+    brume_job_release(job);
+    brume_job_release(other);
+    brume_scene_destroy(scene);
+}
+
 /* Four views of one scene at once: all their targets count, and the rest shrinks to what they leave;
  * afterwards no more of them stay than a few. */
 static void views_share_one_budget(void **state)
@@ -232,7 +268,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(urgent_jobs_come_first),  cmocka_unit_test(patient_jobs_take_turns),
         cmocka_unit_test(cancelled_in_the_queue),  cmocka_unit_test(ending_waits_for_nobody),
-        cmocka_unit_test(pictures_get_better),     cmocka_unit_test(views_share_one_budget),
+        cmocka_unit_test(pictures_get_better),     cmocka_unit_test(parts_of_samples),
+        cmocka_unit_test(views_share_one_budget),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

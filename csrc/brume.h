@@ -506,7 +506,7 @@ typedef struct brume_job_status {
     uint32_t samples_done;
     int32_t result;                  /* brume_result, once ended */
     uint32_t warnings;               /* how many so far */
-    uint32_t picture_samples;        /* that the picture of brume_job_read is made of, 0: none yet */
+    uint32_t picture_samples;        /* that brume_job_read's picture is made of, 0: none yet */
 } brume_job_status;
 
 BRUME_API brume_result brume_render(brume_scene *scene, const brume_settings *settings,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The device: one thread that owns one context and runs tasks, a step of each in turn. Any thread may
- * post. */
+/* The device: one thread that owns one context and runs tasks, a step of each in turn. Any thread
+ * may post. */
 #ifndef BRUME_GL_DEVICE_H
 #define BRUME_GL_DEVICE_H
 

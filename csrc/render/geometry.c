@@ -270,8 +270,8 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
     }
 }
 
-/* To the scene's and the set's. False where finite vertices and a finite matrix make a place that no
- * number holds. */
+/* To the scene's and the set's. False where finite vertices and a finite matrix make a place that
+ * no number holds. */
 static int add_bounds(struct geometry *geometry, const struct mesh_block *mesh, const float *matrix,
                       float set_lower[3], float set_upper[3])
 {
@@ -406,8 +406,8 @@ brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,
     return sync_instances(gpu, geometry, snapshot, control);
 }
 
-/* Whether all of the draw lies beyond one of the clip volume's planes; five of six of a lamp's maps see
- * nothing of it, and vertices are what a CPU spends its time on. */
+/* Whether all of the draw lies beyond one of the clip volume's planes; five of six of a lamp's maps
+ * see nothing of it, and vertices are what a CPU spends its time on. */
 static int is_outside(const struct draw *draw, const mat4 *clip_from_world)
 {
     const float *m = clip_from_world->m;

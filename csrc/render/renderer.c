@@ -448,8 +448,8 @@ static void collect_warnings(struct run *run)
             job_warn_again(control, &stages[stage].warnings[i]);
 }
 
-/* What the view takes its light from: signatures alone where nothing changed since, be it by another
- * request's step. */
+/* What the view takes its light from: signatures alone where nothing changed since, be it by
+ * another request's step. */
 static brume_result run_stages(struct run *run)
 {
     struct renderer *renderer = run->renderer;

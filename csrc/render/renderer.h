@@ -54,9 +54,9 @@ struct render_request {
     double next_picture;
 };
 
-/* Renders a sample, or as many of its rows as a CPU does in a moment; what the scene's stages lack
- * for it comes first. *more: there is more to do, and the result is BRUME_OK. Other requests may take
- * steps in between. */
+/* Renders a sample, or as much of it as a CPU does in a moment; what the scene's stages lack for it
+ * comes first. *more: there is more to do, and the result is BRUME_OK. Other requests may take steps
+ * in between. */
 brume_result renderer_step(struct gpu *gpu, struct renderer *renderer,
                            struct render_request *request, bool *more);
 void renderer_finish(struct gpu *gpu, struct renderer *renderer);

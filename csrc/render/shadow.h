@@ -42,8 +42,8 @@ brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snap
                             const struct shadow_plan *plan, struct job_control *control);
 /* Uploads them: the tiles in lights[].info may have been set in between. */
 brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows);
-/* Draws the maps that differ from what their places hold, and adds to their count. geometry_revision
- * tells the casters apart. */
+/* Draws the maps that differ from what their places hold, and adds to their count.
+ * geometry_revision tells the casters apart. */
 brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,
                             uint64_t geometry_revision, struct job_control *control,
                             uint32_t *drawn);

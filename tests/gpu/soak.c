@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* 200 renders in a row through the public interface, and 500 jobs of two scenes, some cancelled: no GL
- * error, and memory stays where it was once drivers and allocators have warmed up. */
+/* 200 renders in a row through the public interface, and 500 jobs of two scenes, some cancelled: no
+ * GL error, and memory stays where it was once drivers and allocators have warmed up. */
 #include "brume.h"
 
 #include <setjmp.h>

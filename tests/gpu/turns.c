@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Jobs that are under way together: which comes first, that none waits for all of another, that
- * cancelling and destroying need not wait for others, and that the pictures of several views are made
- * within one budget. Order is told by the samples that the others have done, not by the clock. */
+ * cancelling and destroying need not wait for others, and that the pictures of several views are
+ * made within one budget. Order is told by the samples that the others have done, not by the clock. */
 #include "harness.h"
 #include "render/view.h"
 
@@ -214,8 +214,8 @@ static void parts_of_samples(void **state)
     brume_scene_destroy(scene);
 }
 
-/* Four views of one scene at once: all their targets count, and the rest shrinks to what they leave;
- * afterwards no more of them stay than a few. */
+/* Four views of one scene at once: all their targets count, and the rest shrinks to what they
+ * leave; afterwards no more of them stay than a few. */
 static void views_share_one_budget(void **state)
 {
     (void)state;

@@ -17,6 +17,8 @@ def unable(blender, python):
     """Marker of tests -> why this Blender cannot run them, by the versions of Blender and of its
     Python."""
     reasons = {}
+    if blender < (4, 5):
+        reasons["normalize"] = "lamps have no normalization before Blender 4.5"
     if blender < (5, 0) and python >= (3, 13):
         reasons["fluid"] = ("a Fluid domain ends Blender: its Mantaflow calls "
                             "PyImport_AppendInittab() in a running Python, which 3.13 forbids")

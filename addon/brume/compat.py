@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What differs between Blender's versions (3.4 to 5.2): the only place that knows."""
 
+import math
+
 import bpy
 import numpy as np
 
@@ -73,9 +75,29 @@ def positions(mesh):
     return values.reshape(-1, 3)
 
 
-def light_scale(light):
-    """What multiplies a lamp's energy beside its colour: exposure (4.5)."""
-    return 2.0 ** getattr(light, "exposure", 0.0)
+def _lamp_size(light, matrix):
+    """What Cycles divides the power of a normalized lamp by: the area that shines."""
+    if light.type == 'SUN':
+        return math.pi * math.sin(min(light.angle, math.pi) / 2) ** 2 or 1.0
+    if light.type != 'AREA':
+        return 4.0 * math.pi * light.shadow_soft_size ** 2 or 4.0
+    width, height = light.size, light.size_y
+    if light.shape in {'SQUARE', 'DISK'}:
+        height = width
+    stretch = math.prod(np.linalg.norm(matrix[:3, axis]) for axis in (0, 1))
+    return width * height * stretch * (math.pi / 4 if light.shape in {'DISK', 'ELLIPSE'} else 1.0)
+
+
+def light_scale(light, matrix):
+    """What multiplies a lamp's energy beside its colour: exposure, normalization (4.5) and the
+    unit. 4.0 made an area lamp's radiance power / (pi area), after power / (4 area), and scaled
+    older files."""
+    scale = 2.0 ** getattr(light, "exposure", 0.0)
+    if not getattr(light, "normalize", True):
+        scale *= _lamp_size(light, matrix)
+    if light.type == 'AREA' and bpy.app.version >= (4, 0, 0):
+        scale *= 4.0 / math.pi
+    return scale
 
 
 def light_temperature(light):
@@ -98,7 +120,7 @@ def light_is_portal(light):
 
 
 # Of lamps, since 4.5.
-LIGHT_PROPERTIES = ("exposure", "use_temperature", "temperature")
+LIGHT_PROPERTIES = ("exposure", "normalize", "use_temperature", "temperature")
 
 
 def has_blend_method():

@@ -61,7 +61,7 @@ def _export(target, ob, matrix, key, camera_visible):
     kelvin = compat.light_temperature(light)
     if kelvin is not None:
         color = color * blackbody(kelvin)
-    power = color * light.energy * compat.light_scale(light) * _node_factor(light, warn)
+    power = color * light.energy * compat.light_scale(light, matrix) * _node_factor(light, warn)
     if (power < 0).any():
         warn("negative light is left out.")
         power = np.maximum(power, 0.0)

@@ -4,7 +4,7 @@
 # simulation takes a minute; the others take seconds.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
-[ $# -gt 0 ] || set -- plume cloud room cube lamps surfaces environment
+[ $# -gt 0 ] || set -- plume plume_vdb cloud room cube lamps surfaces environment
 for name; do
     "${BLENDER:-blender}" -b --factory-startup --python-exit-code 1 -P "$here/build_$name.py"
 done

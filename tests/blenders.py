@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Blender's versions have in different places for the tests, and what a Blender cannot do."""
 
+import re
+import subprocess
+import sys
+
 try:
     import openvdb as vdb
 except ImportError:
@@ -29,9 +33,24 @@ def unable(blender, python):
     return reasons
 
 
-def deselect(config, items, blender, python):
-    """Leaves out what this Blender cannot do, and says so: a skipped test would count as failed."""
-    reasons = unable(blender, python)
+def versions(command):
+    """Of the Blender that a command starts, and of its Python."""
+    said = subprocess.run(
+        [*command, "-b", "--factory-startup", "--python-expr",
+         "import bpy, sys; print('versions', *bpy.app.version, *sys.version_info[:2])"],
+        check=True, capture_output=True, text=True, timeout=60).stdout
+    numbers = tuple(map(int, re.search(r"^versions ([\d ]+)$", said, re.MULTILINE)[1].split()))
+    return numbers[:3], numbers[3:]
+
+
+def deselect(config, items, command=None):
+    """Leaves out what a Blender cannot do, and says so: a skipped test would count as failed.
+    command starts that Blender; None: it is the one around us."""
+    if command is None:
+        import bpy
+        reasons = unable(bpy.app.version, sys.version_info)
+    else:
+        reasons = unable(*versions(command))
     kept = []
     for item in items:
         marker = next((mark.name for mark in item.iter_markers() if mark.name in reasons), None)

@@ -4,7 +4,6 @@
 import math
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import blenders
@@ -18,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def pytest_collection_modifyitems(config, items):
-    blenders.deselect(config, items, bpy.app.version, sys.version_info)
+    blenders.deselect(config, items)
 
 
 class Recorder:
@@ -189,6 +188,17 @@ def render(tmp_path):
         bpy.ops.render.render(write_still=True)
         return native.exr_read(path)
     return run
+
+
+@pytest.fixture
+def plume():
+    """The simulated plume of blend_scenes/."""
+    path = ROOT / "blend_scenes" / "plume.blend"
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    bpy.context.scene.frame_set(bpy.context.scene.frame_current)
+    yield next(ob for ob in bpy.data.objects
+               if any(m.type == 'FLUID' and m.fluid_type == 'DOMAIN' for m in ob.modifiers))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
 
 
 def blender(*arguments, **environment):

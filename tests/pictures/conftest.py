@@ -3,8 +3,11 @@
 the differences of a run into the page of the method."""
 import os
 
+import blenders
+
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 PAGE = os.path.join(ROOT, 'docs', 'methods', 'opv.md')
+BLENDER = [os.path.join(ROOT, 'scripts', 'blender'), '--factory-startup']
 BEGIN, END = '<!-- pictures -->', '<!-- /pictures -->'
 
 differences = []    # (case, difference, tolerance), as the tests find them
@@ -15,6 +18,10 @@ def pytest_addoption(parser):
                      help='render the Cycles references of the selected cases again')
     parser.addoption('--write-table', action='store_true',
                      help='write the differences into docs/methods/opv.md')
+
+
+def pytest_collection_modifyitems(config, items):
+    blenders.deselect(config, items, BLENDER)
 
 
 def table():

@@ -17,13 +17,12 @@ import conftest
 import references
 from cases import CASES, ROOT
 
-BLENDER = [os.path.join(ROOT, 'scripts', 'blender'), '--factory-startup']
 OUT = os.path.join(ROOT, 'out', 'pictures')
 
 
 @functools.cache
 def brume(name):
-    return references.render(BLENDER, 'BRUME', CASES[name])
+    return references.render(conftest.BLENDER, 'BRUME', CASES[name])
 
 
 @pytest.fixture
@@ -34,7 +33,9 @@ def reference(request):
     return references.load(case)
 
 
-@pytest.mark.parametrize('name', CASES)
+@pytest.mark.parametrize('name', [
+    pytest.param(name, marks=pytest.mark.fluid if case.scene == 'plume' else ())
+    for name, case in CASES.items()])
 def test_against_cycles(name, reference):
     case = CASES[name]
     expected, apart = reference
@@ -78,8 +79,9 @@ def test_passes_against_cycles(name, reference):
         assert compare.difference(ours[light], theirs[light])[0] < 0.005
 
 
+@pytest.mark.fluid
 def test_same_file_gives_same_pixels():
-    again = references.render(BLENDER, 'BRUME', CASES['plume'])
+    again = references.render(conftest.BLENDER, 'BRUME', CASES['plume'])
     assert np.array_equal(brume('plume')['Combined'], again['Combined'])
 
 

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from brume import native
-from brume.export import changes
+from brume.export import changes, fluid
 from brume.export import scene as scene_export
 from brume.export.target import Target
 from brume.export.volume_shader import Program
@@ -202,6 +202,26 @@ def test_edit_mode(studio, viewport, modified):
     bpy.context.view_layer.update()
     viewport.export()
     assert not differences(viewport)
+
+
+@pytest.mark.fluid
+def test_a_simulation_is_read_once_a_frame(plume, monkeypatch):
+    viewport, reads = Viewport(), []
+    read = fluid._read
+    monkeypatch.setattr(fluid, "_read", lambda settings, name: (
+        reads.append(name), read(settings, name))[1])
+    viewport.export()
+    assert reads
+    scene = bpy.context.scene
+    for change, again in ((lambda: None, False), (lambda: _nudge(scene.camera), False),
+                          (lambda: scene.frame_set(scene.frame_current - 1), True)):
+        reads.clear()
+        change()
+        bpy.context.view_layer.update()
+        # It has but one frame on disk, which Blender shows in all.
+        assert viewport.export() == []
+        assert bool(reads) == again
+        assert not differences(viewport)
 
 
 def test_kinds_that_were_sent(studio, viewport):

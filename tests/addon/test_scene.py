@@ -342,18 +342,6 @@ def test_mesh_to_volume_modifier(scene, export):
 # -- fluid domains
 
 
-@pytest.fixture
-def plume(target, recorder):
-    """The simulated plume of blend_scenes/."""
-    from pathlib import Path
-    path = Path(__file__).resolve().parents[2] / "blend_scenes" / "plume.blend"
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-    bpy.context.scene.frame_set(bpy.context.scene.frame_current)
-    yield next(ob for ob in bpy.data.objects
-               if any(m.type == 'FLUID' and m.fluid_type == 'DOMAIN' for m in ob.modifiers))
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-
-
 @pytest.mark.fluid
 def test_fluid_domain(plume, export, target):
     recorder = export()

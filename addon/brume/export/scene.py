@@ -14,7 +14,7 @@ from .. import native, properties
 from ..compat import identity
 from ..native import BrumeError
 from . import fluid, light, material, mesh, nodes, volume, world
-from .changes import GEOMETRY
+from .changes import GEOMETRY, SHADING
 from .target import key_of, key_of_datablock
 
 # Drawn by neither Brume nor Cycles, or presented to engines a second time, as a mesh.
@@ -241,14 +241,21 @@ class _Export:
         return _Shape(key if put else None, inside, medium, next(_serial))
 
 
+def _is_read_again(name, flags):
+    """Whether a change of a datablock means that what was made of it must be made anew."""
+    if name.startswith("Object:"):
+        # All but its data is looked at in every export.
+        return bool(flags & GEOMETRY)
+    # Since 4.2 a change of a material counts as one of the meshes' shading.
+    return not (name.startswith("Mesh:") and flags == SHADING)
+
+
 def export(depsgraph, target, changed=None, space=None):
     """Fills the target with the depsgraph's scene; what could not be shown is in its reports.
     changed: what changes.Changes gave since the last export from there, so that only that is read
     again; None: all is. space: a 3D view whose hidden objects are left out."""
     if changed is not None:
-        # What an object is made of comes into its parts' stamps, but for its data.
-        changed = {name for name, flags in changed.items()
-                   if flags & GEOMETRY or not name.startswith("Object:")}
+        changed = {name for name, flags in changed.items() if _is_read_again(name, flags)}
     target.begin(changed)
     scene = depsgraph.scene_eval
     world.export(target, scene.world, properties.world_reach(scene.brume))

@@ -453,6 +453,8 @@ typedef struct brume_view {
                                         the samples so far: the first at once, then renewed five
                                         times a second */
     uint32_t urgent;                 /* 1: served before all jobs that are not: somebody waits */
+    uint32_t world_draws;            /* of the world's directions, how many a pixel takes in all its
+                                        samples: fewer are quicker and grainier; 0: 64 */
 } brume_view;
 
 typedef enum brume_stage {

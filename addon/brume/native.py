@@ -157,7 +157,7 @@ class View(Structure):
                 ("clip_from_view", Mat4), ("clip_near", c_float), ("clip_far", c_float),
                 ("samples", c_uint32), ("seed", c_uint32), ("filter_width", c_float),
                 ("film_transparent", c_uint32), ("passes", c_uint32), ("progressive", c_uint32),
-                ("urgent", c_uint32)]
+                ("urgent", c_uint32), ("world_draws", c_uint32)]
 
 
 class StageStats(Structure):

@@ -30,6 +30,9 @@ REST_S = 0.1
 SCENE_REST_S = 0.3
 # A look that was to be quick but takes so many times its time is broken off for a newer scene.
 _OVERDUE = 3.0
+# Of the world's directions, what a pixel of a rough picture takes: grainy, but each marches through
+# the volumes, and all of them would be most of its cost.
+_ROUGH_WORLD_DRAWS = 8
 # Stages whose products outlive a picture, and those of the picture itself.
 _SCENE_STAGES = [native.STAGES.index(name) for name in ("upload", "medium", "shadow", "transport")]
 _TRANSPORT = native.STAGES.index("transport")
@@ -104,7 +107,12 @@ class ViewportStage(session.Stage):
     def export(self, depsgraph, space, target_s):
         """space: the view whose hidden objects are left out, None: none are."""
         with trace.span("export"), self.lock:
-            scene.export(depsgraph, self.target, self.changes.take(), space)
+            changed = self.changes.take()
+            try:
+                scene.export(depsgraph, self.target, changed, space)
+            except Exception:
+                self.changes.everything()  # what was taken is not forgotten
+                raise
             reports = list(self.target.reports)
         if self.target.sent_kinds:
             self.serial += 1
@@ -348,7 +356,8 @@ class View:
             samples=task.samples, seed=scene_eval.brume.seed, passes=1,
             filter_width=scene_eval.render.filter_size,
             film_transparent=scene_eval.render.film_transparent,
-            progressive=task.samples > 1, urgent=task.look)
+            progressive=task.samples > 1, urgent=task.look,
+            world_draws=_ROUGH_WORLD_DRAWS if task.rough else 0)
         with self.stage.lock:
             self.job = self.stage.scene.render(settings, view)
         self.task, self.begun_at, self.received = task, now, 0

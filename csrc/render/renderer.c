@@ -15,7 +15,6 @@
 
 /* Steps of a ray through the world's medium where there is no lattice. */
 #define FOG_STEPS 24
-#define WORLD_SAMPLES_A_PIXEL 64u
 /* Of one step on a CPU: a tenth of a second or so. */
 #define SOFTWARE_PIXELS 65536
 /* Between two pictures of a progressive job. */
@@ -153,7 +152,8 @@ static void set_world(struct run *run)
     const uint32_t count = renderer->shadows.world_count;
     const uint32_t samples = run->request->view.samples;
     /* A pixel need not see all of many directions: its neighbours see the others. */
-    const uint32_t seen = count < WORLD_SAMPLES_A_PIXEL ? count : WORLD_SAMPLES_A_PIXEL;
+    const uint32_t draws = run->request->view.world_draws;
+    const uint32_t seen = count < draws ? count : draws;
     const uint32_t each = (seen + samples - 1) / samples;
     const uint32_t every = count > each * samples ? count / (each * samples) : 1;
     frame->world = (uvec4){renderer->shadows.world_first, count, each,

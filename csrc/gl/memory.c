@@ -84,6 +84,14 @@ static uint64_t texel_bytes(GLenum format)
     }
 }
 
+int texture_side(int texels)
+{
+    const int power = (texels & (texels - 1)) == 0;
+    if (!power || texels >= 2048) /* near the driver's limit there is none to waste */
+        return texels;
+    return texels == 1 ? 3 : texels + 1;
+}
+
 brume_result texture_init(struct memory *memory, struct texture *texture, enum purpose purpose,
                           GLenum target, GLenum format, int width, int height, int depth,
                           int levels, const char *label)
@@ -102,6 +110,8 @@ brume_result texture_init(struct memory *memory, struct texture *texture, enum p
         return fail(BRUME_E_MEMORY, "no graphics memory for %d x %d x %d texels of %s", width,
                     height, depth, label);
     }
+    if (target == GL_TEXTURE_3D) /* what no cell fills is read with weight 0, but NaN stays NaN */
+        glClearTexImage(texture->id, 0, GL_RGBA, GL_FLOAT, NULL);
     glObjectLabel(GL_TEXTURE, texture->id, -1, label);
     glTextureParameteri(texture->id, GL_TEXTURE_MIN_FILTER,
                         levels > 1 ? GL_LINEAR_MIPMAP_LINEAR : GL_LINEAR);

@@ -49,9 +49,10 @@ static float nodes_of(const struct box *box, int resolution, ivec4 *dims)
     return cell;
 }
 
-static uint64_t volume_of(const ivec4 *dims)
+static uint64_t texels_of(const ivec4 *dims)
 {
-    return (uint64_t)dims->x * (uint64_t)dims->y * (uint64_t)dims->z;
+    return (uint64_t)texture_side(dims->x) * (uint64_t)texture_side(dims->y) *
+           (uint64_t)texture_side(dims->z);
 }
 
 /* Everything that the scene shows, lamps included: what the world's medium should fill. */
@@ -123,9 +124,10 @@ static int layout_tiles(struct renderer *renderer, int limit)
         ++tile;
     }
     const int used_columns = ((int)tile + per_column - 1) / per_column;
-    renderer->tau_size[0] = tile ? dims.x : 0;
-    renderer->tau_size[1] = used_columns * dims.y;
-    renderer->tau_size[2] = ((int)tile < per_column ? (int)tile : per_column) * dims.z;
+    renderer->tau_size[0] = tile ? texture_side(dims.x) : 0;
+    renderer->tau_size[1] = texture_side(used_columns * dims.y);
+    renderer->tau_size[2] =
+        texture_side(((int)tile < per_column ? (int)tile : per_column) * dims.z);
     return used_columns <= columns;
 }
 
@@ -137,14 +139,14 @@ static uint64_t tau_bytes(const struct renderer *renderer)
 
 uint64_t lattice_depth_bytes(const struct renderer *renderer, const brume_settings *settings)
 {
-    const uint64_t nodes = (uint64_t)settings->lattice_resolution + 2;
+    const uint64_t nodes = (uint64_t)settings->lattice_resolution + 3;
     /* Twice: the last column of tiles may be nearly empty. */
     return nodes * nodes * nodes * NODE_BYTES * 2 * ((uint64_t)renderer->shadows.light_count + 1);
 }
 
 uint64_t lattice_sky_bytes(const brume_settings *settings)
 {
-    const uint64_t nodes = (uint64_t)settings->lattice_resolution / 2 + 6;
+    const uint64_t nodes = (uint64_t)settings->lattice_resolution / 2 + 7;
     return nodes * nodes * nodes * SKY_NODE_BYTES;
 }
 
@@ -204,7 +206,7 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
         int sky = resolution / 2 < 4 ? 4 : resolution / 2;
         for (;; sky = sky * 3 / 4) {
             frame->sky_lower = pack(box.lower, nodes_of(&box, sky, &frame->sky_dims));
-            if (volume_of(&frame->sky_dims) * SKY_NODE_BYTES <= renderer->shares.sky || sky <= 4)
+            if (texels_of(&frame->sky_dims) * SKY_NODE_BYTES <= renderer->shares.sky || sky <= 4)
                 break;
         }
     }

@@ -115,7 +115,8 @@ static uint64_t accumulation_bytes(const brume_view *view)
 
 uint64_t view_bytes(const brume_view *view)
 {
-    return (uint64_t)view->width * (uint64_t)view->height * VIEW_PIXEL_BYTES +
+    return (uint64_t)texture_side(view->width) * (uint64_t)texture_side(view->height) *
+               VIEW_PIXEL_BYTES +
            accumulation_bytes(view);
 }
 
@@ -170,7 +171,8 @@ static brume_result create(struct gpu *gpu, struct view_targets *targets, const 
     glCreateFramebuffers(1, &targets->tint_framebuffer);
     for (size_t i = 0; i < sizeof list / sizeof *list; ++i) {
         TRY(texture_init(&gpu->memory, list[i].texture, FOR_TARGET, GL_TEXTURE_2D, list[i].format,
-                         view->width, view->height, 1, 1, list[i].label));
+                         texture_side(view->width), texture_side(view->height), 1, 1,
+                         list[i].label));
         if (list[i].attachment != GL_NONE)
             glNamedFramebufferTexture(targets->framebuffer, list[i].attachment,
                                       list[i].texture->id, 0);
@@ -190,7 +192,8 @@ static brume_result create(struct gpu *gpu, struct view_targets *targets, const 
 
 static bool fits(const struct view_targets *targets, const brume_view *view)
 {
-    return targets->normal.width == view->width && targets->normal.height == view->height &&
+    return targets->normal.width == texture_side(view->width) &&
+           targets->normal.height == texture_side(view->height) &&
            targets->accumulation.bytes == accumulation_bytes(view);
 }
 

@@ -74,14 +74,35 @@ static void fit_halves(struct medium_lattice *lattice)
     }
 }
 
+/* A lattice ends with its last layer of cells; where the texture goes on, so does that layer, as if
+ * it were clamped to its edge. */
+static void repeat_last_layers(const struct texture *texture, const int32_t dims[3])
+{
+    const int sides[3] = {texture->width, texture->height, texture->depth};
+    int size[3] = {dims[0], dims[1], dims[2]};
+    for (int axis = 0; axis < 3; ++axis) {
+        int layer[3] = {size[0], size[1], size[2]}, from[3] = {0, 0, 0}, to[3] = {0, 0, 0};
+        if (size[axis] == sides[axis])
+            continue;
+        layer[axis] = 1;
+        from[axis] = size[axis] - 1;
+        to[axis] = size[axis];
+        glCopyImageSubData(texture->id, GL_TEXTURE_3D, 0, from[0], from[1], from[2], texture->id,
+                           GL_TEXTURE_3D, 0, to[0], to[1], to[2], layer[0], layer[1], layer[2]);
+        size[axis] += 1;
+    }
+}
+
 static brume_result fill(struct gpu *gpu, struct texture *texture, GLenum format,
                          const int32_t dims[3], GLenum channels, const float *data,
                          const char *label)
 {
-    TRY(texture_ensure(&gpu->memory, texture, FOR_MEDIUM, GL_TEXTURE_3D, format, dims[0], dims[1],
-                       dims[2], 1, label));
+    TRY(texture_ensure(&gpu->memory, texture, FOR_MEDIUM, GL_TEXTURE_3D, format,
+                       texture_side(dims[0]), texture_side(dims[1]), texture_side(dims[2]), 1,
+                       label));
     glTextureSubImage3D(texture->id, 0, 0, 0, 0, dims[0], dims[1], dims[2], channels, GL_FLOAT,
                         data);
+    repeat_last_layers(texture, dims);
     return BRUME_OK;
 }
 

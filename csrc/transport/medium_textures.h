@@ -14,8 +14,8 @@ struct medium_textures {
 };
 
 /* Bytes of a cell on the GPU: scatter and extinction, and emission where there is one, as halves,
- * and its part of a brick. */
-#define MEDIUM_CELL_BYTES 25
+ * its part of a brick, and of the layers by which textures are larger than the lattice. */
+#define MEDIUM_CELL_BYTES 30
 
 /* Brings the lattice's values within what half floats hold, and uploads them. */
 brume_result medium_textures_upload(struct gpu *gpu, struct medium_textures *textures,

@@ -151,7 +151,8 @@ static brume_result run_sky(struct transport *transport, const struct transport_
     TRY(program_compute(&input->gpu->programs, "opv_sky", &program));
     for (int i = 0; i < 3; ++i) {
         TRY(texture_ensure(&input->gpu->memory, &transport->sky[i], FOR_TRANSPORT, GL_TEXTURE_3D,
-                           GL_RGBA16F, dims->x, dims->y, dims->z, 1, labels[i]));
+                           GL_RGBA16F, texture_side(dims->x), texture_side(dims->y),
+                           texture_side(dims->z), 1, labels[i]));
         glBindImageTexture((GLuint)(SLOT_OUTPUT + i), transport->sky[i].id, 0, GL_TRUE, 0,
                            GL_WRITE_ONLY, GL_RGBA16F);
     }

@@ -14,7 +14,8 @@ bool medium_exists()
 
 vec3 medium_coordinate(vec3 p)
 {
-    return (p - frame.medium_lower.xyz) / (frame.medium_lower.w * vec3(frame.medium_dims.xyz));
+    return (p - frame.medium_lower.xyz) /
+           (frame.medium_lower.w * vec3(textureSize(medium_extinct, 0)));
 }
 
 // Distance along the direction to the end of an empty brick, 0 where the brick has something.
@@ -22,7 +23,7 @@ float medium_skip(vec3 p, vec3 direction)
 {
     float side = frame.medium_lower.w * float(BRICK_CELLS);
     vec3 q = (p - frame.medium_lower.xyz) / side;
-    ivec3 last = textureSize(medium_bricks, 0) - 1;
+    ivec3 last = (frame.medium_dims.xyz - 1) / BRICK_CELLS;
     ivec3 brick = clamp(ivec3(floor(q)), ivec3(0), last);
     if (texelFetch(medium_bricks, brick, 0).r > 0.0)
         return 0.0;

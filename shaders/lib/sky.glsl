@@ -12,7 +12,7 @@ vec3 sky_scatter(vec3 p, vec3 out_direction, float g)
 {
     vec3 node = clamp((p - frame.sky_lower.xyz) / frame.sky_lower.w, vec3(0.0),
                       vec3(frame.sky_dims.xyz - 1));
-    vec3 uvw = (node + 0.5) / vec3(frame.sky_dims.xyz);
+    vec3 uvw = (node + 0.5) / vec3(textureSize(sky_r, 0));
     vec4 r = textureLod(sky_r, uvw, 0.0);
     vec4 gr = textureLod(sky_g, uvw, 0.0);
     vec4 b = textureLod(sky_b, uvw, 0.0);

@@ -188,27 +188,28 @@ static void impossible_budgets_are_refused(void **state)
 static void bytes_of_pixels_and_cells(void **state)
 {
     (void)state;
-    const brume_settings settings = {.medium_resolution = 32, .lattice_resolution = 8,
+    const brume_settings settings = {.medium_resolution = 16, .lattice_resolution = 8,
                                      .shadow_resolution = 32};
     brume_scene *scene = full_scene();
     brume_stats small, large, stats;
-    brume_view view = view_of(64);
+    brume_view view = view_of(100);
     brume_job_release(render_within(scene, settings, &view, 64 << 20, &small));
-    view = view_of(128);
+    view = view_of(200);
     view.passes = (1u << BRUME_PASS_COUNT) - 1;
     brume_job_release(render_within(scene, settings, &view, 64 << 20, &large));
     /* The blocks, which both have, cancel. */
     assert_int_equal(large.target_bytes - small.target_bytes,
-                     128 * 128 * (VIEW_PIXEL_BYTES + BRUME_PASS_COUNT * VIEW_PASS_PIXEL_BYTES) -
-                         64 * 64 * (VIEW_PIXEL_BYTES + VIEW_PASS_PIXEL_BYTES));
-    const double cells = 32.0 * 32.0 * 32.0;
+                     200 * 200 * (VIEW_PIXEL_BYTES + BRUME_PASS_COUNT * VIEW_PASS_PIXEL_BYTES) -
+                         100 * 100 * (VIEW_PIXEL_BYTES + VIEW_PASS_PIXEL_BYTES));
+    /* A power of two: its layers beyond the lattice count too, the more the smaller it is. */
+    const double cells = 16.0 * 16.0 * 16.0;
     assert_true((double)small.medium_bytes / cells <= MEDIUM_CELL_BYTES);
     assert_true((double)small.medium_bytes / cells > MEDIUM_CELL_BYTES - 1.5);
 
     static const struct coefficients dark = {.sigma_s = {1, 1, 1}};
     add_fog_cube(scene, 1, origin, 0.5f, &dark);
     brume_job_release(render_within(scene, settings, &view, 64 << 20, &stats));
-    assert_close((double)(small.medium_bytes - stats.medium_bytes) / cells, 8.0, 1e-9);
+    assert_close((double)(small.medium_bytes - stats.medium_bytes) / (17.0 * 17.0 * 17.0), 8.0, 1e-9);
     brume_scene_destroy(scene);
 }
 

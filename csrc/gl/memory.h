@@ -45,9 +45,9 @@ brume_result buffer_update(struct memory *memory, struct buffer *buffer, enum pu
                            uint64_t bytes, const void *data, const char *label);
 void buffer_finish(struct memory *memory, struct buffer *buffer);
 
-/* The side of a texture that holds so many texels, one more where those are a power of two: llvmpipe
- * compiles every shader anew, for a second or so, when a texture's side becomes one or ceases to be.
- * Lattices and pictures change their sizes while somebody waits. */
+/* The side of a texture that holds so many texels, one more where those are a power of two:
+ * llvmpipe compiles every shader anew, for a second or so, when a texture's side becomes one or
+ * ceases to be. Lattices and pictures change their sizes while somebody waits. */
 int texture_side(int texels);
 
 /* target: GL_TEXTURE_2D, _2D_ARRAY or _3D. Linear filter, clamp to edge. */

@@ -178,14 +178,15 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
         frame->medium_upper = pack(medium->upper, medium->emits ? 1.0f : 0.0f);
         frame->medium_dims = (ivec4){medium->dims[0], medium->dims[1], medium->dims[2], 1};
         for (;; resolution = resolution * 3 / 4) {
-            frame->lattice_lower = pack(medium->lower, nodes_of(&box, resolution,
-                                                                &frame->lattice_dims));
+            frame->lattice_lower =
+                pack(medium->lower, nodes_of(&box, resolution, &frame->lattice_dims));
             if (layout_tiles(renderer, gpu->context.info.max_texture_3d) &&
                 tau_bytes(renderer) <= renderer->shares.depth)
                 break;
             if (resolution == 1)
-                return fail(BRUME_E_MEMORY, "the optical depths of %u lamps do not fit the memory "
-                                            "budget",
+                return fail(BRUME_E_MEMORY,
+                            "the optical depths of %u lamps do not fit the memory "
+                            "budget",
                             renderer->shadows.light_count);
         }
         if (resolution < settings->lattice_resolution)

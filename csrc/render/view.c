@@ -50,16 +50,16 @@ void view_frame(const brume_view *view, uint32_t sample, struct gpu_frame *frame
     if (is_orthographic(view)) {
         frame->ray_origin_x = rotate(world_from_view, dx, 0.0f, 0.0f);
         frame->ray_origin_y = rotate(world_from_view, 0.0f, dy, 0.0f);
-        frame->ray_origin =
-            offset_by(eye, frame->ray_origin_x, ndc[0] - p[12], frame->ray_origin_y, ndc[1] - p[13]);
+        frame->ray_origin = offset_by(eye, frame->ray_origin_x, ndc[0] - p[12], frame->ray_origin_y,
+                                      ndc[1] - p[13]);
         frame->ray_direction = rotate(world_from_view, 0.0f, 0.0f, -1.0f);
         frame->ray_direction_x = frame->ray_direction_y = (vec4){0};
     } else {
         frame->ray_direction_x = rotate(world_from_view, dx, 0.0f, 0.0f);
         frame->ray_direction_y = rotate(world_from_view, 0.0f, dy, 0.0f);
-        frame->ray_direction = offset_by(rotate(world_from_view, 0.0f, 0.0f, -1.0f),
-                                         frame->ray_direction_x, ndc[0] + p[8],
-                                         frame->ray_direction_y, ndc[1] + p[9]);
+        frame->ray_direction =
+            offset_by(rotate(world_from_view, 0.0f, 0.0f, -1.0f), frame->ray_direction_x,
+                      ndc[0] + p[8], frame->ray_direction_y, ndc[1] + p[9]);
         frame->ray_origin = eye;
         frame->ray_origin_x = frame->ray_origin_y = (vec4){0};
     }
@@ -96,9 +96,9 @@ static struct gpu_draw camera_draw(const brume_view *view, uint32_t sample)
     struct gpu_draw draw = {.clip = {near_, far_, orthographic ? 1.0f : 0.0f, 0.0f},
                             .info = {view->seed + sample, 0, 0, 0}};
     mat4_multiply(projection, view->view_from_world, draw.clip_from_world.m);
-    draw.eye = orthographic ? rotate(world_from_view, 0.0f, 0.0f, -1.0f)
-                            : (vec4){world_from_view[12], world_from_view[13], world_from_view[14],
-                                     1.0f};
+    draw.eye = orthographic
+                   ? rotate(world_from_view, 0.0f, 0.0f, -1.0f)
+                   : (vec4){world_from_view[12], world_from_view[13], world_from_view[14], 1.0f};
     return draw;
 }
 
@@ -174,8 +174,8 @@ static brume_result create(struct gpu *gpu, struct view_targets *targets, const 
                          texture_side(view->width), texture_side(view->height), 1, 1,
                          list[i].label));
         if (list[i].attachment != GL_NONE)
-            glNamedFramebufferTexture(targets->framebuffer, list[i].attachment,
-                                      list[i].texture->id, 0);
+            glNamedFramebufferTexture(targets->framebuffer, list[i].attachment, list[i].texture->id,
+                                      0);
     }
     static const GLenum buffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
                                      GL_COLOR_ATTACHMENT2, GL_COLOR_ATTACHMENT3};

@@ -21,8 +21,8 @@ static int clamp(int value, int low, int high)
  * extinction or emission. */
 static float *make_bricks(const struct medium_lattice *lattice, const int bricks[3])
 {
-    float *occupied = calloc((size_t)bricks[0] * (size_t)bricks[1] * (size_t)bricks[2],
-                             sizeof *occupied);
+    float *occupied =
+        calloc((size_t)bricks[0] * (size_t)bricks[1] * (size_t)bricks[2], sizeof *occupied);
     if (!occupied)
         return NULL;
     const int32_t *dims = lattice->dims;

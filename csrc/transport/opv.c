@@ -84,9 +84,9 @@ static brume_result compare_tiles(struct transport *transport, const struct tran
 {
     const struct texture *tau = &transport->tau;
     const int *size = input->tau_size;
-    const uint32_t kept =
-        tau->width == size[0] && tau->height == size[1] && tau->depth == size[2]
-            ? transport->tau_count : 0;
+    const uint32_t kept = tau->width == size[0] && tau->height == size[1] && tau->depth == size[2]
+                              ? transport->tau_count
+                              : 0;
     uint64_t *held = calloc(2 * (size_t)input->light_count, sizeof *held);
     if (!held)
         return fail(BRUME_E_MEMORY, "no memory for %u lights", input->light_count);

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Starts Blender in a window on a virtual display and has it play scenarios."""
+
+import ast
+import json
+import os
+import re
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+WINDOW = 640, 480  # Blender makes none smaller
+TIMEOUT_S = 900
+# What Blender or the library says when something went wrong.
+WRONG = re.compile(r"Traceback|\bError\b|ERROR|[Aa]ssert|GL error|GL_INVALID|Segmentation|Aborted"
+                   r"|memory leak|Not freed")
+
+
+class Played(NamedTuple):
+    status: int
+    said: str       # both of Blender's streams
+    results: dict   # by the scenario's name: its values, error and seconds; none if not got to
+
+    @property
+    def wrong(self):
+        """The lines that should not be there."""
+        return [line for line in self.said.splitlines() if WRONG.search(line)]
+
+
+def scenarios(theme):
+    """The names of a theme's scenarios, and whether they are slow: the marks of its functions."""
+    found = {}
+    for node in ast.parse((HERE / f"{theme}.py").read_text(encoding="utf-8")).body:
+        for mark in getattr(node, "decorator_list", []):
+            if isinstance(mark, ast.Call) and mark.func.id == "scenario":
+                options = {word.arg: ast.literal_eval(word.value) for word in mark.keywords}
+                found[node.name] = options.get("slow", False)
+    return found
+
+
+def play(theme, names, **environment):
+    """Plays scenarios of a theme in one Blender."""
+    width, height = (str(side) for side in WINDOW)
+    with tempfile.TemporaryDirectory() as folder:
+        results = Path(folder) / "results.jsonl"
+        # xvfb-run mixes both streams into one; what Blender leaves at its end goes into the folder.
+        done = subprocess.run(
+            ["xvfb-run", "-a", "-s", f"-ac -screen 0 {width}x{height}x24",
+             ROOT / "scripts" / "blender", "--factory-startup", "-p", "0", "0", width, height,
+             "-P", HERE / "play.py", "--", theme, results, *names],
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+            timeout=TIMEOUT_S, env=os.environ | {"TMPDIR": folder} | environment)
+        lines = results.read_text(encoding="utf-8").splitlines() if results.exists() else []
+        found = {entry["name"]: entry for entry in map(json.loads, lines)}
+    return Played(done.returncode, done.stdout, found)

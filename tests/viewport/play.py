@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Plays scenarios one after another inside a Blender with a window, writes down how each ended,
+and quits as a user does. Started by launch.py:
+
+    blender --python play.py -- THEME RESULTS.jsonl NAME...
+"""
+
+import importlib
+import json
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import bpy
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+import drive  # noqa: E402
+
+TICK_S = 0.03
+PATIENCE_S = 150.0
+
+
+def prepare(scene_name):
+    """A scenario's scene in the window it was saved with, the factory's."""
+    bpy.ops.wm.open_mainfile(load_ui=True, filepath=str(
+        HERE.parents[1] / "blend_scenes" / f"{scene_name}.blend"))
+    yield 0.2
+    view = bpy.context.preferences.view
+    view.show_splash, view.render_display_type, view.ui_scale = False, 'NONE', 1.0
+    bpy.context.preferences.use_preferences_save = False
+    scene = bpy.context.scene
+    scene.render.engine = 'BRUME'
+    scene.view_settings.view_transform = 'Standard'
+    scene.render.resolution_percentage = 100
+    scene.render.resolution_x, scene.render.resolution_y = 480, 270
+    scene.brume.preset = 'DRAFT'
+    scene.brume.samples = scene.brume.viewport_samples = 8
+    drive.events.clear()
+    yield 0.1
+
+
+def show(theme, results, names):
+    """Generates what all of the scenarios wait for."""
+    importlib.import_module(theme)
+    for name in names:
+        entry = {"name": name, "error": None, "values": None}
+        began = time.perf_counter()
+        try:
+            function, scene = drive.scenarios[name]
+            yield from prepare(scene)
+            entry["values"] = yield from function()
+        except Exception:
+            entry["error"] = traceback.format_exc()
+        entry["seconds"] = round(time.perf_counter() - began, 2)
+        with open(results, "a", encoding="utf-8") as file:
+            file.write(json.dumps(entry) + "\n")
+    bpy.ops.wm.quit_blender()
+
+
+class Player:
+    """Advances the show from a timer."""
+
+    def __init__(self, show):
+        self.show, self.wait, self.since = show, 0.0, 0.0
+
+    def tick(self):
+        """Gives the seconds until it wants to be called again. While a scenario waits for a time,
+        nothing is done that could keep Blender from its rest."""
+        try:
+            self.wait = self.advance()
+        except StopIteration:
+            return None
+        return TICK_S if callable(self.wait) else self.wait
+
+    def advance(self):
+        if callable(self.wait):
+            try:
+                if not self.wait():
+                    if time.perf_counter() < self.since + PATIENCE_S:
+                        return self.wait
+                    raise TimeoutError(f"waited for {PATIENCE_S} s")
+            except Exception as error:
+                wait = self.show.throw(error)
+            else:
+                wait = next(self.show)
+        else:
+            wait = next(self.show)
+        self.since = time.perf_counter()
+        return wait
+
+
+for handler in ("render_pre", "render_complete", "render_cancel"):
+    drive.note(handler)
+theme, results, *names = sys.argv[sys.argv.index("--") + 1:]
+bpy.context.preferences.view.show_splash = False
+bpy.app.timers.register(Player(show(theme, results, names)).tick, first_interval=1.0,
+                        persistent=True)

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scenarios: animations and volume sequences that play."""
+
+import tempfile
+from pathlib import Path
+
+import bpy
+from drive import alone, at, regions, rendered_views, scenario, settled
+from eyes import as_rendered, different, shown
+from latency import of_kind, traced
+
+FRAMES = 12
+
+
+def written_sequence(folder):
+    """A sequence of volumes that grow, by Blender itself."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8)
+    ball = bpy.context.object
+    ball.hide_render = True
+    data = bpy.data.volumes.new("Maker")
+    maker = bpy.data.objects.new("Maker", data)
+    bpy.context.scene.collection.objects.link(maker)
+    modifier = maker.modifiers.new("Fill", 'MESH_TO_VOLUME')
+    modifier.object, modifier.voxel_amount, modifier.density = ball, 24, 1.0
+    for frame in range(1, FRAMES + 1):
+        ball.scale = [0.4 + 0.6 * frame / FRAMES] * 3
+        evaluated = maker.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        assert evaluated.data.grids.save(filepath=str(folder / f"ball_{frame:04}.vdb"))
+    bpy.data.objects.remove(maker)
+    bpy.data.objects.remove(ball)
+    bpy.data.volumes.remove(data)
+
+
+def sequence_in_the_cube(folder):
+    """In place of the cube of fog."""
+    written_sequence(folder)
+    fog = bpy.data.objects["Fog"]
+    fog.hide_viewport = fog.hide_render = True
+    volume = bpy.data.volumes.new("Ball")
+    volume.filepath = str(folder / "ball_0001.vdb")
+    volume.is_sequence, volume.frame_duration, volume.frame_start = True, FRAMES, 1
+    volume.sequence_mode = 'REPEAT'
+    volume.materials.append(fog.material_slots[0].material)
+    ob = bpy.data.objects.new("Ball", volume)
+    ob.location.z = 1.0
+    bpy.context.scene.collection.objects.link(ob)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, FRAMES
+    bpy.context.scene.frame_set(1)
+
+
+def played(region, seconds):
+    """Plays; gives the frames that Blender came to, and the draws of the view."""
+    frames = []
+
+    def note(scene, *_):
+        frames.append(scene.frame_current)
+
+    bpy.app.handlers.frame_change_post.append(note)
+    with traced() as events:
+        bpy.ops.screen.animation_play()
+        yield seconds
+        bpy.ops.screen.animation_play()
+        bpy.app.handlers.frame_change_post.remove(note)
+        draws = of_kind(events, "draw")
+        exports = of_kind(events, "export")
+    return frames, exports, [values for *_, values in draws if values]
+
+
+@scenario()
+def volume_sequence():
+    """Frames are dropped rather than queued, and pictures go on changing while it plays."""
+    area = yield from alone()
+    region, = regions(area)
+    area.spaces.active.region_3d.view_matrix = bpy.context.scene.camera.matrix_world.inverted()
+    with tempfile.TemporaryDirectory() as folder:
+        sequence_in_the_cube(Path(folder))
+        yield from rendered_views()
+        first = shown(region)
+        with at(area):
+            frames, exports, draws = yield from played(region, 5.0)
+        scenes = [values["scene"] for values in draws]
+        assert len(frames) > FRAMES, f"it did not play: {frames}"
+        assert len(set(scenes)) > 4, f"pictures of {len(set(scenes))} frames in 5 s"
+        assert scenes == sorted(scenes), "an older picture came after a newer one"
+        # What was exported is what was shown, but for what was under way at the end.
+        assert len(exports) <= len(set(scenes)) + 2, (len(exports), len(set(scenes)))
+        assert len(exports) <= len(frames)
+        bpy.context.scene.frame_set(FRAMES)
+        yield from settled()
+        different(shown(region), first, "the last frame")
+        found = as_rendered(region, "the last frame")
+        bpy.data.objects.remove(bpy.data.objects["Ball"])  # lets the files go
+        yield from settled()
+    return {"apart": found, "frames": len(frames), "shown": len(set(scenes))}

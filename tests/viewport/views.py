@@ -186,10 +186,15 @@ def hidden():
 def holdout():
     area, region = yield from alone_rendered()
     before = shown(region)
+    # A hole shows what is behind the picture: black in a file, the theme's background in a view.
+    gradients = bpy.context.preferences.themes[0].view_3d.space.gradients
+    kept, gradients.high_gradient = tuple(gradients.high_gradient), (0.0, 0.0, 0.0)
     bpy.data.objects["Block"].is_holdout = True
     yield from settled()
     different(shown(region), before, "with a holdout")
-    return as_rendered(region, "holdout")
+    found = as_rendered(region, "holdout")
+    gradients.high_gradient = kept
+    return found
 
 
 @scenario()
@@ -286,7 +291,8 @@ def coarse_pixels():
         yield from settled()
         view, = views()
         height, width = view.picture.pixels.shape[:2]
-        assert (width, height) == (round(SIZE[0] / int(size)), round(SIZE[1] / int(size)))
+        assert (width, height) == (round(region.width / int(size)),
+                                   round(region.height / int(size)))
         found[size] = alike(shown(region), fine, f"pixels of {size}", 0.02 * int(size))
     return found
 

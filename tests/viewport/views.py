@@ -84,7 +84,8 @@ def passepartout():
     overlay.show_overlays = True
     overlay.show_floor = overlay.show_axis_x = overlay.show_axis_y = False
     overlay.show_object_origins = overlay.show_extras = overlay.show_text = False
-    overlay.show_outline_selected = overlay.show_relationship_lines = False
+    overlay.show_outline_selected = overlay.show_relationship_lines = overlay.show_cursor = False
+    bpy.data.objects["Fog"].display_type = 'TEXTURED'  # its wires would be drawn
     camera.show_passepartout, camera.passepartout_alpha = True, 1.0
     yield from settled()
     covered = shown(region)

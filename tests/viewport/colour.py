@@ -115,7 +115,10 @@ def overlays():
     """What an object hides of the grid and of things behind it, and what is over the picture."""
     bpy.data.objects["Floor"].hide_viewport = bpy.data.objects["Floor"].hide_render = True
     bpy.data.objects["Wall"].hide_viewport = bpy.data.objects["Wall"].hide_render = True
-    bpy.context.scene.world.color = (0.5, 0.5, 0.5)
+    background = next(node for node in bpy.context.scene.world.node_tree.nodes
+                      if node.type == 'BACKGROUND')
+    background.inputs["Color"].default_value = (0.3, 0.3, 0.3, 1.0)
+    background.inputs["Strength"].default_value = 1.0
     area, region = yield from alone_rendered()
     overlay = area.spaces.active.overlay
     ball = bpy.data.objects["Ball"]
@@ -124,23 +127,21 @@ def overlays():
     plain = shown(region)
 
     only(overlay, "show_floor")
-    ball.location.z += 0.0
     yield from settled()
     grid = changed(shown(region), plain)
     assert grid[outside].sum() > 100, "there is no grid"
     # Seen from above its plane, the ball stands before all of the grid that is behind it.
     assert grid[inside].sum() == 0, f"{grid[inside].sum()} pixels of grid before the ball"
 
-    # An empty at the far side of the ball, larger than it.
-    only(overlay)
+    # An empty at the far side of the ball, larger than it, among the lamps' own lines.
+    only(overlay, "show_extras")
+    yield from settled()
+    plain = shown(region)
     away = ball.matrix_world.translation - region.data.view_matrix.inverted().translation
     empty = bpy.data.objects.new("Behind", None)
     empty.empty_display_type, empty.empty_display_size = 'SPHERE', 1.2
     empty.location = ball.matrix_world.translation + 2.0 * away.normalized()
     bpy.context.scene.collection.objects.link(empty)
-    yield from settled()
-    plain = shown(region)
-    only(overlay, "show_extras")
     yield from settled()
     lines = changed(shown(region), plain)
     assert lines[outside].sum() > 50, "there is no empty"

@@ -15,17 +15,16 @@ Prints one JSON line per engine and appends it to FILE (out/bench/peers.jsonl).
 import argparse
 import json
 import os
-import platform
 import statistics
-import subprocess
 import sys
 import time
-from datetime import datetime, timezone
 
 import bpy
 from brume import native, session
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.path.append(os.path.dirname(os.path.abspath(__file__)))
+from place import ROOT, here
+
 ENGINES = ('BRUME', 'BLENDER_EEVEE', 'CYCLES')
 CYCLES_SAMPLES = 64
 SIZE = 640, 360
@@ -78,28 +77,11 @@ def samples_of(engine):
             'BLENDER_EEVEE': lambda: scene.eevee.taa_render_samples}[engine]()
 
 
-def processor():
-    with open('/proc/cpuinfo', encoding='utf-8') as file:
-        for line in file:
-            if line.startswith('model name'):
-                return line.split(':', 1)[1].strip()
-    return platform.processor()
-
-
 def place():
     """Where and with what: the same for all lines of a run."""
-    def git(*arguments):
-        return subprocess.run(['git', '-C', ROOT, *arguments], capture_output=True, text=True,
-                              check=True).stdout.strip()
-
     info = session.device().describe()
-    return {'commit': git('rev-parse', '--short=12', 'HEAD'),
-            'modified': bool(git('status', '--porcelain', '--untracked-files=no')),
-            'time': datetime.now(timezone.utc).isoformat(timespec='seconds'),
-            'blender': bpy.app.version_string,
-            'device': info.renderer.decode(), 'driver': info.version.decode(),
-            'processor': processor(), 'threads': len(os.sched_getaffinity(0)),
-            'load': os.getloadavg()[0]}
+    return {**here(), 'blender': bpy.app.version_string,
+            'device': info.renderer.decode(), 'driver': info.version.decode()}
 
 
 def median_of(items, key):

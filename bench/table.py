@@ -1,27 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the Markdown tables of the docs from the JSON lines of bench/peers.py.
+"""Makes the Markdown tables of the docs from the JSON lines of bench/peers.py or viewport.py.
 
     python3 bench/table.py FILE.jsonl [--into docs/PAGE.md]
 
 Takes the newest line of each scene, resolution, engine and device. With --into, the tables replace
-what stands between <!-- bench:peers --> and <!-- /bench:peers --> in the page.
+what stands between <!-- bench:peers --> and <!-- /bench:peers -->, or bench:viewport, in the page.
 """
 import argparse
 import json
 import sys
 
-BEGIN, END = '<!-- bench:peers -->', '<!-- /bench:peers -->'
 NAMES = {'BRUME': 'Brume', 'BLENDER_EEVEE': 'EEVEE', 'CYCLES': 'Cycles'}
 
 
-def newest(path):
+def read(path):
+    with open(path, encoding='utf-8') as file:
+        return [json.loads(text) for text in filter(str.strip, file)]
+
+
+def newest(lines):
     """{(scene, resolution, device, processor): {engine: line}}; later lines replace earlier."""
     groups = {}
-    with open(path, encoding='utf-8') as file:
-        for text in filter(str.strip, file):
-            line = json.loads(text)
-            key = line['scene'], tuple(line['resolution']), line['device'], line['processor']
-            groups.setdefault(key, {})[line['engine']] = line
+    for line in lines:
+        key = line['scene'], tuple(line['resolution']), line['device'], line['processor']
+        groups.setdefault(key, {})[line.get('engine')] = line
     return groups
 
 
@@ -58,13 +60,50 @@ def memory_table(line):
     yield row(*(f'{mebibytes(value)} MiB' for value in memory.values()))
 
 
+def version(line):
+    return line['commit'] + (' with changes' if line['modified'] else '')
+
+
+def caption(line, versions):
+    width, height = line['resolution']
+    return (f'`{line["scene"]}.blend` at {width}x{height}, Blender {line["blender"]}; '
+            f'{line["device"]} ({line["driver"]}); {line["processor"]}, {line["threads"]} threads; '
+            f'commit {versions}.')
+
+
+def milliseconds(values, *keys):
+    return ' / '.join(f'{values[key]:.1f}' for key in keys) + ' ms'
+
+
+def viewport_page(groups):
+    for lines in groups.values():
+        line = lines[None]
+        brume, eevee, lamp = line['brume'], line['eevee'], line['lamp']
+        yield caption(line, version(line))
+        yield ''
+        yield row('', 'Brume', 'EEVEE')
+        yield row('---', '---:', '---:')
+        yield row('pictures a second while orbiting',
+                  *(f'{engine["pictures_per_s"]:.1f}' for engine in (brume, eevee)))
+        yield row('their pixels, in pixels of the screen', f'{brume["pixel_size"]:g}', '1')
+        yield row('view_update and view_draw while orbiting: median / 99 % / longest',
+                  milliseconds(brume['hold'], 'p50_ms', 'p99_ms', 'max_ms'), '')
+        yield row("from a lamp's move to a picture that shows it: median / longest",
+                  milliseconds(lamp['shown'], 'p50_ms', 'max_ms'), '')
+        yield row("from a lamp's move to the finished picture: median",
+                  milliseconds(lamp, 'settled_ms'), '')
+        yield row('first picture after switching to Rendered: first time / again',
+                  milliseconds(line['picture'], 'first_ms', 'again_ms'), '')
+        yield row('of a core, from 5 s after the last change (Blender in solid view)',
+                  f'{100 * line["idle"]:.1f} % ({100 * line["idle_without"]:.1f} %)', '')
+        yield ''
+
+
 def page(groups):
-    for (scene, (width, height), device, processor), lines in groups.items():
+    for lines in groups.values():
         some = next(iter(lines.values()))
-        versions = ', '.join(sorted({line['commit'] + (' with changes' if line['modified'] else '')
-                                     for line in lines.values()}))
-        yield (f'`{scene}.blend` at {width}x{height}, Blender {some["blender"]}; {device} '
-               f'({some["driver"]}); {processor}, {some["threads"]} threads; commit {versions}.')
+        versions = ', '.join(sorted({version(line) for line in lines.values()}))
+        yield caption(some, versions)
         yield ''
         yield from peers_table(lines)
         yield ''
@@ -79,23 +118,29 @@ def page(groups):
             yield ''
 
 
+PAGES = {'peers': page, 'viewport': viewport_page}
+
+
 def main():
     parser = argparse.ArgumentParser(prog='table.py')
     parser.add_argument('lines')
     parser.add_argument('--into')
     options = parser.parse_args()
-    text = '\n'.join(page(newest(options.lines)))
+    lines = read(options.lines)
+    bench = lines[-1].get('bench', 'peers')
+    text = '\n'.join(PAGES[bench](newest(lines)))
     if not options.into:
         print(text)
         return
+    begin, end = f'<!-- bench:{bench} -->', f'<!-- /bench:{bench} -->'
     with open(options.into, encoding='utf-8') as file:
         old = file.read()
-    if BEGIN not in old or END not in old:
-        sys.exit(f'{options.into} has no {BEGIN} … {END}')
-    before, rest = old.split(BEGIN, 1)
-    after = rest.split(END, 1)[1]
+    if begin not in old or end not in old:
+        sys.exit(f'{options.into} has no {begin} … {end}')
+    before, rest = old.split(begin, 1)
+    after = rest.split(end, 1)[1]
     with open(options.into, 'w', encoding='utf-8') as file:
-        file.write(f'{before}{BEGIN}\n{text}\n{END}{after}')
+        file.write(f'{before}{begin}\n{text}\n{end}{after}')
 
 
 main()

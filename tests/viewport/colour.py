@@ -4,7 +4,7 @@ draws over the picture."""
 
 import bpy
 import numpy as np
-from drive import scenario, settled, shade
+from drive import scenario, settled
 from eyes import as_rendered, different, eye, final, part, shown
 from views import alone_rendered
 
@@ -52,7 +52,7 @@ def display_transforms():
 
 @scenario()
 def transparent_film():
-    """Over the theme's background, which solid shading shows too."""
+    """Over the theme's background, as another engine shows it where there is nothing."""
     bpy.data.objects["Floor"].hide_viewport = bpy.data.objects["Floor"].hide_render = True
     area, region = yield from alone_rendered()
     with_world = shown(region)
@@ -60,8 +60,7 @@ def transparent_film():
     yield from settled()
     picture = shown(region)
     different(picture, with_world, "with transparent film")
-    shade('SOLID')
-    area.spaces.active.shading.background_type = 'THEME'
+    bpy.context.scene.render.engine = 'BLENDER_WORKBENCH'
     for ob in bpy.context.scene.objects:
         ob.hide_set(True)
     yield 0.5

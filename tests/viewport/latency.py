@@ -159,11 +159,15 @@ def lamp_moves():
 
 
 def idle():
-    """The share of a core that Blender takes at rest; no timer of ours runs meanwhile."""
+    """The share of a core that Blender takes at rest; no timer of ours runs meanwhile. Nothing
+    is drawn any more."""
     yield IDLE_AFTER_S
-    before, began = sum(os.times()[:2]), time.perf_counter()
-    yield IDLE_S
-    return (sum(os.times()[:2]) - before) / (time.perf_counter() - began)
+    with traced() as events:
+        before, began = sum(os.times()[:2]), time.perf_counter()
+        yield IDLE_S
+        share = (sum(os.times()[:2]) - before) / (time.perf_counter() - began)
+        assert not events, f"at rest, but: {events}"
+    return share
 
 
 @scenario("plume")
@@ -173,7 +177,8 @@ def smooth():
     area = yield from alone()
     from_the_front(area)
     region, = regions(area)
-    found = {"resolution": [region.width, region.height], "blender": bpy.app.version_string}
+    found = {"scene": "plume", "resolution": [region.width, region.height],
+             "blender": bpy.app.version_string}
     found["picture"] = yield from first_pictures()
     found["lamp"] = yield from lamp_moves()
     found["idle"] = yield from idle()

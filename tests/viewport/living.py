@@ -47,7 +47,7 @@ def working(area=None):
 
 def rest():
     """Ends what working() began, and waits for it."""
-    bpy.context.scene.brume.viewport_samples = 8
+    bpy.context.scene.brume.viewport_samples = 4
     yield from settled()
 
 
@@ -121,7 +121,7 @@ def disabled_and_enabled():
     scene = bpy.context.scene
     scene.render.engine = 'BRUME'
     scene.brume.preset = 'DRAFT'
-    scene.brume.samples = scene.brume.viewport_samples = 8
+    scene.brume.samples = scene.brume.viewport_samples = 4
     yield from rendered_views()
     return as_camera_sees(region, "enabled again")
 
@@ -193,7 +193,7 @@ def final_render_beside():
     yield from press_in(region, "Escape")
     yield heard("render_cancel", cancelled + 1)
     waited = events[-1][1] - asked
-    scene.brume.samples = 8
+    scene.brume.samples = 4
     yield from f12()
     yield from rest()
     found = as_camera_sees(region, "beside a render")
@@ -218,7 +218,7 @@ def f12_in_the_window():
     yield from press_in(region, "Escape")
     yield heard("render_cancel", cancelled + 1)
     waited = events[-1][1] - asked
-    scene.brume.samples = 8
+    scene.brume.samples = 4
     yield from f12()
     picture = saved_render()
     something(picture)

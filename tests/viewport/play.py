@@ -34,6 +34,7 @@ def prepare(scene_name):
     view = bpy.context.preferences.view
     view.show_splash, view.render_display_type, view.ui_scale = False, 'NONE', 1.0
     bpy.context.preferences.use_preferences_save = False
+    bpy.context.preferences.filepaths.use_auto_save_temporary_files = False  # would take its time
     scene = bpy.context.scene
     scene.render.engine = 'BRUME'
     scene.view_settings.view_transform = 'Standard'
@@ -41,7 +42,7 @@ def prepare(scene_name):
     scene.render.resolution_percentage = 100
     scene.render.resolution_x, scene.render.resolution_y = 480, 270
     scene.brume.preset = 'DRAFT'
-    scene.brume.samples = scene.brume.viewport_samples = 8
+    scene.brume.samples = scene.brume.viewport_samples = 4
     drive.events.clear()
     yield 0.1
 

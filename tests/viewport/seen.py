@@ -11,7 +11,10 @@ def compared():
     area = yield from alone()
     region, = regions(area)
     view = region.data
-    camera = bpy.context.scene.camera
+    scene = bpy.context.scene
+    camera, settings = scene.camera, scene.brume
+    # In camera view the pixels are others than the render's, and so is their noise.
+    settings.samples = settings.viewport_samples = 8
     look_through_camera()
     yield from rendered_views()
     found = {"CAMERA": as_camera_sees(region, "camera view")}

@@ -19,12 +19,23 @@ class Framing(NamedTuple):
     clip_far: float
 
 
-def clip_range(window_matrix):
-    """(near, far) of an OpenGL projection: what a 3D view says itself does not hold for the
-    camera that it looks through, nor for orthographic views, which also see behind their plane."""
+def state(context):
+    """What a region's framing depends on beside the scene, to be compared with another."""
+    space, region_view = context.space_data, context.region_data
+    return (context.region.width, context.region.height, space.clip_end, space.use_render_border,
+            space.render_border_min_x, space.render_border_min_y, space.render_border_max_x,
+            space.render_border_max_y, *np.array(region_view.window_matrix).ravel().tolist(),
+            *np.array(region_view.view_matrix).ravel().tolist())
+
+
+def clip_range(window_matrix, clip_end):
+    """(near, far) of an OpenGL projection: orthographic views see behind their plane too, which
+    they say nowhere else. A perspective's far end is in its matrix, but rounded away where it is
+    far: clip_end tells it."""
     scale, offset = window_matrix[2][2], window_matrix[2][3]
     if window_matrix[3][3] == 0.0:
-        return offset / (scale - 1.0), offset / (scale + 1.0)
+        near = offset / (scale - 1.0)
+        return near, max(clip_end, 2.0 * near)
     return (offset + 1.0) / scale, (offset - 1.0) / scale
 
 
@@ -37,6 +48,15 @@ def camera_frame(camera, scene, window_matrix):
     return (*places.min(0).tolist(), *places.max(0).tolist())
 
 
+def seen_through(space, region_view, scene):
+    """The camera object that a 3D view looks through; None if it looks through none, or through an
+    object that is no camera."""
+    if region_view.view_perspective != 'CAMERA':
+        return None
+    camera = space.camera if space.use_local_camera else scene.camera
+    return camera if camera is not None and camera.type == 'CAMERA' else None
+
+
 def border(space, region_view, scene):
     """The border that is drawn by hand (Ctrl-B), in fractions of the region; None without."""
     if region_view.view_perspective != 'CAMERA':
@@ -44,9 +64,8 @@ def border(space, region_view, scene):
             return None
         return (space.render_border_min_x, space.render_border_min_y,
                 space.render_border_max_x, space.render_border_max_y)
-    render = scene.render
-    camera = space.camera if space.use_local_camera else scene.camera
-    if not render.use_border or camera is None or camera.type != 'CAMERA':
+    render, camera = scene.render, seen_through(space, region_view, scene)
+    if not render.use_border or camera is None:
         return None
     x0, y0, x1, y1 = camera_frame(camera, scene, region_view.window_matrix)
     return (x0 + render.border_min_x * (x1 - x0), y0 + render.border_min_y * (y1 - y0),
@@ -69,6 +88,9 @@ def of(context, scene):
     part = part_of(region, border(context.space_data, region_view, scene))
     if part[2] < 1 or part[3] < 1:
         return None
+    camera = seen_through(context.space_data, region_view, scene)
+    clip_end = camera.data.clip_end if camera else context.space_data.clip_end
     projection = cropped(np.array(region_view.window_matrix, np.float64), region, part)
     return Framing(region, part, tuple(np.array(region_view.view_matrix).ravel().tolist()),
-                   tuple(projection.ravel().tolist()), *clip_range(region_view.window_matrix))
+                   tuple(projection.ravel().tolist()),
+                   *clip_range(region_view.window_matrix, clip_end))

@@ -138,16 +138,21 @@ class SceneQuality:
         self._begun = True
 
     def learn(self, seconds):
-        """What the scene's stages of the picture after a change took."""
+        """What the scene's stages of the picture after a change took; nothing, if another view's
+        picture has paid for the change or is about to."""
+        if seconds == 0.0:
+            return
         if self._kinds and self._steady:
             costs = self._costs.setdefault(self._kinds, {})
             costs[self.level] = min(seconds, _OUTLIER * costs.get(self.level, seconds))
         self._kinds = None
 
-    def learn_full(self, seconds):
-        """What all of it took at full resolution: no change costs more."""
-        for costs in self._costs.values():
-            costs[0] = min(costs.get(0, seconds), seconds)
+    def learn_full(self, seconds, with_medium):
+        """What all of it took at full resolution, or all but the medium: no change of that costs
+        more."""
+        for kinds, costs in self._costs.items():
+            if with_medium or "volume" not in kinds:
+                costs[0] = min(costs.get(0, seconds), seconds)
 
     def apply(self, settings):
         """Lowers native.Settings in place."""

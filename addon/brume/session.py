@@ -10,6 +10,7 @@ import threading
 from typing import NamedTuple
 
 from . import native
+from .export import files
 from .export.target import Target
 
 _lock = threading.Lock()
@@ -39,6 +40,7 @@ class Stage:
 
     def close(self):
         with self.lock:
+            self.target.files.close()
             self.scene.close()
 
 
@@ -49,6 +51,11 @@ def device():
         if _device is None:
             _device = native.Device()
         return _device
+
+
+def ready():
+    """Whether the device is there, so that device() answers at once."""
+    return _device is not None
 
 
 class Start(threading.Thread):
@@ -62,7 +69,7 @@ class Start(threading.Thread):
     def run(self):
         try:
             device()
-        except native.BrumeError as error:
+        except Exception as error:  # told by done()
             self._error = error
 
     def done(self):
@@ -106,8 +113,8 @@ def drop(name, wait=True):
             return
         if not wait:
             thread = threading.Thread(target=dropped.close, name="brume drop")
-            _closing[:] = [other for other in _closing if other.is_alive()] + [thread]
             thread.start()
+            _closing[:] = [other for other in _closing if other.is_alive()] + [thread]
             return
     dropped.close()
 
@@ -115,6 +122,7 @@ def drop(name, wait=True):
 def close():
     """Frees all scenes, then the device."""
     global _device
+    files.shutdown()
     for name in list(_stages):
         drop(name)
     for thread in _closing:

@@ -35,6 +35,7 @@ _OVERDUE = 3.0
 _ROUGH_WORLD_DRAWS = 8
 # Stages whose products outlive a picture, and those of the picture itself.
 _SCENE_STAGES = [native.STAGES.index(name) for name in ("upload", "medium", "shadow", "transport")]
+_MEDIUM = native.STAGES.index("medium")
 _TRANSPORT = native.STAGES.index("transport")
 _VIEW_STAGES = [native.STAGES.index(name) for name in ("gbuffer", "shade", "march", "passes")]
 
@@ -110,13 +111,14 @@ class ViewportStage(session.Stage):
             changed = self.changes.take()
             try:
                 scene.export(depsgraph, self.target, changed, space)
+                reports = list(self.target.reports)
             except Exception:
                 self.changes.everything()  # what was taken is not forgotten
                 raise
-            reports = list(self.target.reports)
-        if self.target.sent_kinds:
-            self.serial += 1
-            self.quality.change(self.target.sent_kinds, target_s)
+            finally:
+                if self.target.sent_kinds:
+                    self.serial += 1
+                    self.quality.change(self.target.sent_kinds, target_s)
         # Blender drops what a viewport's engine reports.
         for _, sentence in reports:
             if sentence not in self.reports:
@@ -159,7 +161,7 @@ class View:
     def __init__(self, engine):
         self.name = f"viewport {engine.as_pointer()}"
         self.engine = weakref.ref(engine)
-        self.start = session.Start()
+        self.start = None         # of the device
         self.pace = Pace()
         self.stage = None         # and the name that it is held by
         self.stage_name = None
@@ -172,7 +174,7 @@ class View:
         self.due = None           # when to go on after a rest
         self.notified = False     # whether a redraw was asked for and has not come yet
         self.impatient = False    # whether the last look was broken off
-        self.failed = False
+        self.failed = None        # how the view stood when something went wrong
         self.picture = None
         self.texture = None       # of the picture, on Blender's side
         self.stats = None         # of the last job that ended
@@ -192,8 +194,10 @@ class View:
         """Something changed; what, is collected in stage.changes. The next picture is begun before
         Blender redraws, which takes a while too."""
         with trace.span("update"):
-            self.failed = False
-            self._guard(self._advance, engine, context, depsgraph)
+            self.failed = None
+            # Through a camera the view has not followed it yet.
+            if context.region_data.view_perspective != 'CAMERA':
+                self._guard(self._advance, engine, context, depsgraph)
             engine.tag_redraw()
             if self._waiting():
                 _wake()
@@ -201,10 +205,11 @@ class View:
     def draw(self, engine, context, depsgraph):
         with trace.span("draw") as values:
             self.notified = False
-            if not self.failed:
+            if self.failed != framing.state(context):
+                self.failed = None
                 self._guard(self._advance, engine, context, depsgraph)
             if self.picture is not None:
-                self._show(context.region)
+                self._guard(self._show, engine, context)
                 values.update(view=self.name, picture=self.picture.serial,
                               scene=self.picture.scene, pixel_size=self.picture.size,
                               samples=self.picture.samples)
@@ -236,7 +241,8 @@ class View:
 
     def _waiting(self):
         return (self.start is not None or self.job is not None or self.due is not None
-                or self.stage is not None and self.stage.target.loading)
+                or self.stage is not None
+                and (self.stage.target.loading or self.stage.target.arrived))
 
     def _news(self):
         """Whether a redraw would show or begin anything."""
@@ -249,20 +255,20 @@ class View:
         status = self.job.poll()
         return status.ended or status.picture_samples > self.received
 
-    def _guard(self, work, engine, *arguments):
-        """Does the work; what goes wrong is said in the corner, and the scene's next change
-        tries again."""
+    def _guard(self, work, engine, context, *arguments):
+        """Does the work; what goes wrong is said in the corner, and the next change of the scene
+        or of the view tries again."""
         try:
-            work(engine, *arguments)
+            work(engine, context, *arguments)
             return
         except native.BrumeError as error:
             sentence = f"{error.sentence} ({error.id})"
         except Exception as error:
             traceback.print_exc()
             sentence = f"{type(error).__name__}: {error}"
-        self.failed = True
-        self.start = self.due = None
         self._drop_job()
+        self.failed = framing.state(context)
+        self.start = self.due = self.wish = self.task = None
         engine.update_stats("Brume", sentence)
 
     def _drop_job(self):
@@ -283,6 +289,8 @@ class View:
 
     def _advance(self, engine, context, depsgraph):
         """Takes what is finished and begins what is next."""
+        if self.start is None and not session.ready():
+            self.start = session.Start()
         if self.start is not None:
             if not self.start.done():
                 return
@@ -301,16 +309,25 @@ class View:
             self._drop_job()
             self.impatient = True
         if self.stage.outdated:
+            before = self.stage.serial
             self.stage.export(depsgraph, own_space, target_s)
+            if self.stage.serial != before:
+                self._tell_others()
         wish = self._wish(engine, context, depsgraph)
         if wish != self.wish:
             self._drop_job()
-            self.wish, self.changed_at, self.task = wish, now, None
+            self.wish, self.changed_at, self.task, self.due = wish, now, None, None
         if self.job is None and wish.framing is None:
             self.picture = None  # a border outside of the region
         elif self.job is None:
             self._begin_next(depsgraph, now, target_s)
         self._tell(engine, settings)
+
+    def _tell_others(self):
+        """Blender redraws all views after a change, but not after what only a look finds."""
+        for view in views():
+            if view is not self and view.stage is self.stage and view.engine() is not None:
+                view.engine().tag_redraw()
 
     def _wish(self, engine, context, depsgraph):
         scene_eval = depsgraph.scene_eval
@@ -392,7 +409,7 @@ class View:
         if self.task.look:
             self.stage.quality.learn(scene_s)
         elif stats.stages[_TRANSPORT].wall_ms > 0:
-            self.stage.quality.learn_full(scene_s)
+            self.stage.quality.learn_full(scene_s, stats.stages[_MEDIUM].wall_ms > 0)
         if self.task.samples == 1:
             self.pace.learn(pixels, view_s)
 
@@ -411,7 +428,7 @@ class View:
                 said.append(session.told(self.stats))
         engine.update_stats("", " | ".join(said))
 
-    def _show(self, region):
+    def _show(self, engine, context):
         """Draws the picture where it belongs, stretched if the region's size changed since."""
         import gpu  # not usable, and not needed, in background
         from gpu_extras.presets import draw_texture_2d
@@ -421,8 +438,11 @@ class View:
                                     self.picture.pixels.reshape(-1))
             self.texture = gpu.types.GPUTexture((width, height), format='RGBA16F', data=data)
         (full_width, full_height), (x, y, width, height) = self.picture.framing[:2]
-        stretch_x, stretch_y = region.width / full_width, region.height / full_height
+        stretch_x = context.region.width / full_width
+        stretch_y = context.region.height / full_height
         gpu.state.blend_set('ALPHA_PREMULT')
-        draw_texture_2d(self.texture, (x * stretch_x, y * stretch_y), width * stretch_x,
-                        height * stretch_y)
-        gpu.state.blend_set('NONE')
+        try:
+            draw_texture_2d(self.texture, (x * stretch_x, y * stretch_y), width * stretch_x,
+                            height * stretch_y)
+        finally:
+            gpu.state.blend_set('NONE')

@@ -3,6 +3,7 @@
 
 import gc
 import random
+import time
 import weakref
 from types import SimpleNamespace
 
@@ -251,6 +252,29 @@ def test_pending(studio, viewport):
     assert viewport.changes.take() == {"Object:Wall:": changes.TRANSFORM} or (
         bpy.app.version >= (4, 3, 0))
     assert not viewport.changes.pending
+
+
+def test_a_reloaded_image_is_sent_again(studio, viewport, tmp_path):
+    def write(grey):
+        source = bpy.data.images.new("Source", 2, 2)
+        source.pixels.foreach_set([grey, grey, grey, 1.0] * 4)
+        source.filepath_raw, source.file_format = str(tmp_path / "picture.png"), 'PNG'
+        source.save()
+        bpy.data.images.remove(source)
+
+    write(0.0)
+    image = bpy.data.images.load(str(tmp_path / "picture.png"))
+    next(node for node in studio.papered.node_tree.nodes
+         if node.bl_idname == "ShaderNodeTexImage").image = image
+    bpy.context.view_layer.update()
+    viewport.export()
+    assert not viewport.changes.pending
+    write(1.0)
+    image.reload()
+    time.sleep(0.05)  # images are not looked at all the time
+    assert viewport.changes.pending
+    assert viewport.export() == ["image"]
+    assert not differences(viewport)
 
 
 def test_another_view_layer_is_not_meant(studio, viewport):

@@ -6,6 +6,7 @@ They are silent about images: painting announces an image without naming it, and
 settings nothing at all. So the state of all images is looked at when somebody asks.
 """
 
+import time
 import weakref
 
 import bpy
@@ -14,6 +15,9 @@ from bpy.app.handlers import persistent
 from .. import compat
 
 GEOMETRY, TRANSFORM, SHADING = 1, 2, 4
+
+# Of a view's time, what looking at images may take: a thousand of them take some milliseconds.
+_LOOK_SHARE = 0.05
 
 _listeners = weakref.WeakSet()
 
@@ -25,6 +29,7 @@ class Changes:
         self._of = compat.identity(scene), view_layer.name
         self._changed = None  # None: everything
         self._images = {}     # their states at the last look
+        self._look_again = 0.0  # not before
         _listeners.add(self)
 
     @property
@@ -32,7 +37,8 @@ class Changes:
         """Whether an export would find anything new."""
         if self._changed is None:
             return True
-        self._look_at_images()
+        if time.perf_counter() > self._look_again:
+            self._look_at_images()
         return bool(self._changed)
 
     def take(self):
@@ -54,18 +60,30 @@ class Changes:
         return self._of == (compat.identity(depsgraph.scene), depsgraph.view_layer.name)
 
     def _look_at_images(self):
+        began = time.perf_counter()
         before, self._images = self._images, _image_states()
+        now = time.perf_counter()
+        self._look_again = now + (now - began) / _LOOK_SHARE
         self.add({name: 0 for name in before.keys() | self._images.keys()
-                  if before.get(name) != self._images.get(name)})
+                  if _is_other(before.get(name), self._images.get(name))})
 
 
 def _image_states():
-    """What can be changed on an image by name; asking for its size would load it."""
+    """Of each image what can be changed on it by name, and whether it is loaded. Asking for its
+    size would load it."""
     return {compat.identity(image): (
-        image.as_pointer(), image.filepath, image.source, image.alpha_mode, image.is_dirty,
-        image.colorspace_settings.name, image.generated_type, image.generated_width,
-        image.generated_height, tuple(image.generated_color))
+        (image.as_pointer(), image.filepath, image.source, image.alpha_mode, image.is_dirty,
+         image.colorspace_settings.name, image.generated_type, image.generated_width,
+         image.generated_height, tuple(image.generated_color)), image.has_data)
         for image in bpy.data.images if image.source != 'VIEWER'}  # renders' results
+
+
+def _is_other(before, now):
+    """Whether an image's state tells of a change. Its pixels come when an export asks for them, but
+    go when it is read anew from its file."""
+    if before is None or now is None:
+        return True
+    return before[0] != now[0] or before[1] > now[1]
 
 
 def _owners():
@@ -123,4 +141,6 @@ def register():
 
 def unregister():
     for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+        handlers = getattr(bpy.app.handlers, name)
+        if handler in handlers:  # scripts clear such lists
+            handlers.remove(handler)

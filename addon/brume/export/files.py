@@ -25,6 +25,15 @@ def _workers():
     return _pool
 
 
+def shutdown():
+    """Leaves no thread behind but what is being read; else Python's end would wait for all that is
+    to be read."""
+    global _pool
+    if _pool is not None:
+        _pool.shutdown(wait=False, cancel_futures=True)
+        _pool = None
+
+
 class File:
     """A .vdb file as it was at one time: its list of grids, and those that were read."""
 
@@ -38,7 +47,8 @@ class File:
         """Lists the grids, and reads those of these names that there are; raises BrumeError."""
         try:
             if self.infos is None:
-                self.infos = {info.name.decode(): info for info in vdb_list(self.path)}
+                self.infos = {info.name.decode(errors="replace"): info
+                              for info in vdb_list(self.path)}
             for name in names:
                 if name in self.infos and name not in self.grids:
                     self.grids[name] = Grid.load_vdb(self.path, name)
@@ -172,8 +182,15 @@ class Files:
     def _read(self, file, names):
         try:
             file.read(names)
-        except BrumeError:
-            pass  # raised again where the file is asked for
+        except Exception as error:
+            file.error = error  # raised again where the file is asked for
+        finally:
+            with self._lock:
+                self._loads.pop(file.stamp, None)
+                self.arrived = True
+
+    def close(self):
+        """Drops what is not being read yet."""
         with self._lock:
-            self._loads.pop(file.stamp, None)
-            self.arrived = True
+            for load in self._loads.values():
+                load.cancel()

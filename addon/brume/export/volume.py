@@ -65,7 +65,7 @@ class _Scratch:
         self.target, self.path = target, path
         digest = hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest()
         self.stamp = "memory", digest
-        self.infos = {info.name.decode(): info for info in vdb_list(path)}
+        self.infos = {info.name.decode(errors="replace"): info for info in vdb_list(path)}
 
     def grids(self, names):
         return [self.target.grid((*self.stamp, name), partial(Grid.load_vdb, self.path, name))

@@ -299,7 +299,7 @@ class View:
         settings = depsgraph.scene_eval.brume
         target_s = settings.viewport_frame_time / 1000
         own_space = self._hold_stage(depsgraph, context.space_data)
-        self._receive()
+        self._receive(target_s)
         if self.job is not None and self.task.look:
             # A look is shown even if it is late: else none would be while the view turns. But one
             # that is long overdue gives way to a newer scene, though not twice in a row.
@@ -379,7 +379,7 @@ class View:
             self.job = self.stage.scene.render(settings, view)
         self.task, self.begun_at, self.received = task, now, 0
 
-    def _receive(self):
+    def _receive(self, target_s):
         """Takes the job's newest picture, and lets a job go that ended."""
         if self.job is None:
             return
@@ -398,12 +398,13 @@ class View:
             try:
                 job.check(status)
                 if status.state == native.JOB_DONE:
-                    self._learn(job.stats(), job.width * job.height)
+                    self._learn(job.stats(), job.width * job.height, target_s)
             finally:
                 job.close()
 
-    def _learn(self, stats, pixels):
+    def _learn(self, stats, pixels, target_s):
         self.stats = stats
+        took_s = time.perf_counter() - self.begun_at
         scene_s, view_s = (sum(stats.stages[stage].wall_ms for stage in stages) / 1000
                            for stages in (_SCENE_STAGES, _VIEW_STAGES))
         if self.task.look:
@@ -411,7 +412,9 @@ class View:
         elif stats.stages[_TRANSPORT].wall_ms > 0:
             self.stage.quality.learn_full(scene_s, stats.stages[_MEDIUM].wall_ms > 0)
         if self.task.samples == 1:
-            self.pace.learn(pixels, view_s)
+            # From one picture to the next there is more: the queue, the timer, Blender's drawing.
+            # If that alone takes too long, smaller pictures would not help.
+            self.pace.learn(pixels, min(took_s - scene_s, view_s + 0.5 * target_s))
 
     def _tell(self, engine, settings):
         """In the view's corner: warnings, and what the picture took if wanted."""

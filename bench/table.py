@@ -85,7 +85,7 @@ def viewport_page(groups):
         yield row('---', '---:', '---:')
         yield row('pictures a second while orbiting',
                   *(f'{engine["pictures_per_s"]:.1f}' for engine in (brume, eevee)))
-        yield row('their pixels, in pixels of the screen', f'{brume["pixel_size"]:g}', '1')
+        yield row('their pixels, in pixels of the screen', f'{brume["pixel_size"]:g}', '')
         yield row('view_update and view_draw while orbiting: median / 99 % / longest',
                   milliseconds(brume['hold'], 'p50_ms', 'p99_ms', 'max_ms'), '')
         yield row("from a lamp's move to a picture that shows it: median / longest",

@@ -129,12 +129,6 @@ def press_in(region, key):
     yield from press(key)
 
 
-def click(region, x, y, button=1):
-    yield from point(region, x, y)
-    xdotool("click", button)
-    yield 0.15
-
-
 def drag_pixels(start, end, button=1, moves=12):
     """Drags from one place of the display to another."""
     xdotool("mousemove", *start)

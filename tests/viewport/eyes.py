@@ -163,7 +163,7 @@ def as_rendered(region, what, **options):
     return alike(picture[edge, edge], reference[edge, edge], what, **options)
 
 
-def camera_box(region, view_matrix_of=None):
+def camera_box(region):
     """The box of a region that the camera's picture takes, in fractions."""
     scene = bpy.context.scene
     corners = [scene.camera.matrix_world @ corner

@@ -172,8 +172,8 @@ def idle():
 
 @scenario("plume")
 def smooth():
-    """All figures; what is asserted holds on any machine, but for the longest hold, which is
-    measured on an idle one."""
+    """All figures. Holds are 10 to 15 ms on two cores, also when they are three times too few;
+    the rest of what is asserted is ratios and processor time."""
     area = yield from alone()
     from_the_front(area)
     region, = regions(area)

@@ -35,7 +35,7 @@ def clip_range(window_matrix, clip_end):
     scale, offset = window_matrix[2][2], window_matrix[2][3]
     if window_matrix[3][3] == 0.0:
         near = offset / (scale - 1.0)
-        return near, max(clip_end, 2.0 * near)
+        return near, max(clip_end, near * (1.0 + 1e-4))
     return (offset + 1.0) / scale, (offset - 1.0) / scale
 
 

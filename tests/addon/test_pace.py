@@ -130,6 +130,7 @@ def test_clip_range_of_both_projections():
     perspective = np.diag([1.0, 1.0, -(far + near) / (far - near), 0.0])
     perspective[2, 3], perspective[3, 2] = -2 * far * near / (far - near), -1.0
     assert framing.clip_range(perspective, far) == pytest.approx((near, far))
+    assert framing.clip_range(perspective, 0.15) == pytest.approx((near, 0.15))
     perspective[2, 2] = -1.0  # what single precision makes of it where far is far enough
     assert framing.clip_range(perspective, 1e9) == pytest.approx((near, 1e9), rel=3e-3)
     orthographic = np.diag([1.0, 1.0, -2 / (far - near), 1.0])

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the user guide's pictures: scenes rendered by Brume, and its panels in Blender's window.
 
-    docs/images/make.py [NAME]...      all, or some of: room cloud panels
+    docs/images/make.py [NAME]...      all, or some of: room cloud panels viewport
 
 Needs what scripts/setup installs, and a built library; a virtual display is its own.
 """
@@ -25,30 +25,20 @@ scene.render.resolution_percentage = 100
 scene.render.image_settings.file_format = 'PNG'
 scene.render.image_settings.color_mode = 'RGB'
 """
-# Two columns of properties in the place of the 3D view, each with one tab.
-PANELS = """
+# Plays steps(), which yields while Blender is to go on, in its window.
+WINDOW = """
 import bpy, subprocess
 bpy.context.preferences.view.show_splash = False
-window = bpy.context.window_manager.windows[0]
 bpy.context.scene.render.engine = 'BRUME'
-bpy.context.view_layer.objects.active = bpy.data.objects["Area"]
+window = bpy.context.window_manager.windows[0]
 view = next(area for area in window.screen.areas if area.type == 'VIEW_3D')
-before = set(window.screen.areas)
 
-def steps():
-    with bpy.context.temp_override(window=window, area=view):
-        bpy.ops.screen.area_split(direction='VERTICAL', factor=0.5)
-    pair = [view, *set(window.screen.areas) - before]
-    for area in pair:
-        area.type = 'PROPERTIES'
-    yield
-    left, right = sorted(pair, key=lambda area: area.x)
-    left.spaces[0].context, right.spaces[0].context = 'RENDER', 'DATA'
-    yield
-    yield
-    width, top = right.x + right.width - left.x, window.height - left.y - left.height
-    subprocess.run(["import", "-window", "root", "-crop", f"{width}x{left.height}+{left.x}+{top}",
+def shoot(x, y, width, height):
+    top = window.height - y - height
+    subprocess.run(["import", "-window", "root", "-crop", f"{width}x{height}+{x}+{top}",
                     "+repage", "-depth", "8", "FILE"], check=True)
+
+STEPS
 
 step = steps()
 
@@ -63,6 +53,45 @@ def tick():
         raise
 
 bpy.app.timers.register(tick, first_interval=1.0)
+"""
+# Two columns of properties in the place of the 3D view, each with one tab.
+PANELS = """
+def steps():
+    bpy.context.view_layer.objects.active = bpy.data.objects["Area"]
+    before = set(window.screen.areas)
+    with bpy.context.temp_override(window=window, area=view):
+        bpy.ops.screen.area_split(direction='VERTICAL', factor=0.5)
+    pair = [view, *set(window.screen.areas) - before]
+    for area in pair:
+        area.type = 'PROPERTIES'
+    yield
+    left, right = sorted(pair, key=lambda area: area.x)
+    left.spaces[0].context, right.spaces[0].context = 'RENDER', 'DATA'
+    yield
+    yield
+    shoot(left.x, left.y, right.x + right.width - left.x, left.height)
+"""
+# The rendered view with its statistics, while the lamp is selected.
+VIEWPORT = """
+def steps():
+    from brume import viewport
+    scene, space = bpy.context.scene, view.spaces.active
+    scene.brume.show_statistics = True
+    for ob in bpy.context.view_layer.objects:
+        ob.select_set(ob.name == "Area")
+    bpy.context.view_layer.objects.active = bpy.data.objects["Area"]
+    looked = scene.camera.matrix_world
+    space.region_3d.view_perspective = 'PERSP'
+    scene.camera.hide_set(True)  # it would stand in the way
+    space.region_3d.view_rotation = looked.to_quaternion()
+    space.region_3d.view_location = bpy.data.objects["Smoke"].matrix_world.translation
+    space.region_3d.view_distance = 0.75 * looked.translation.length
+    space.shading.type = 'RENDERED'
+    yield
+    while not (viewport.views() and viewport.views()[0].settled):
+        yield
+    yield
+    shoot(view.x, view.y, view.width, view.height)
 """
 
 
@@ -83,15 +112,18 @@ def scene(name):
         (HERE / f"{name}.png").write_bytes(picture.read_bytes())
 
 
-def panels():
-    width, height = (str(side) for side in (820, 560))
-    blender("-p", "0", "0", width, height, ROOT / "blend_scenes" / "plume.blend", "--python-expr",
-            PANELS.replace("FILE", str(HERE / "panels.png")), display=f"{width}x{height}")
+def window(name, steps, width, height):
+    blender("-p", "0", "0", str(width), str(height), ROOT / "blend_scenes" / "plume.blend",
+            "--python-expr",
+            WINDOW.replace("STEPS", steps).replace("FILE", str(HERE / f"{name}.png")),
+            display=f"{width}x{height}")
 
 
-for wanted in sys.argv[1:] or (*SCENES, "panels"):
-    if wanted == "panels":
-        panels()
+WINDOWS = {"panels": (PANELS, 820, 560), "viewport": (VIEWPORT, 1100, 720)}
+
+for wanted in sys.argv[1:] or (*SCENES, *WINDOWS):
+    if wanted in WINDOWS:
+        window(wanted, *WINDOWS[wanted])
     elif wanted in SCENES:
         scene(wanted)
     else:

@@ -321,7 +321,7 @@ class View:
             self.picture = None  # a border outside of the region
         elif self.job is None:
             self._begin_next(depsgraph, now, target_s)
-        self._tell(engine, settings)
+        engine.update_stats("", self.corner(settings))
 
     def _tell_others(self):
         """Blender redraws all views after a change, but not after what only a look finds."""
@@ -416,8 +416,8 @@ class View:
             # If that alone takes too long, smaller pictures would not help.
             self.pace.learn(pixels, min(took_s - scene_s, view_s + 0.5 * target_s))
 
-    def _tell(self, engine, settings):
-        """In the view's corner: warnings, and what the picture took if wanted."""
+    def corner(self, settings):
+        """What stands in the view's corner: warnings, and what the picture took if wanted."""
         said = self.stage.reports[:1]
         if self.stage.reports[1:]:
             said = [f"{len(self.stage.reports)} warnings, the first: {said[0]}"]
@@ -429,7 +429,7 @@ class View:
                 said.append(f"pixels of {self.picture.size:g}")
             if self.stats is not None:
                 said.append(session.told(self.stats))
-        engine.update_stats("", " | ".join(said))
+        return " | ".join(said)
 
     def _show(self, engine, context):
         """Draws the picture where it belongs, stretched if the region's size changed since."""

@@ -23,9 +23,10 @@ events = []      # (name, time) of the render handlers
 scenarios = {}   # by name: (function, the name of its scene)
 
 
-def scenario(scene="cube", slow=False):
+def scenario(scene="cube", slow=False, fluid=False):
     """Marks a scenario that is played in blend_scenes/SCENE.blend. What is slow is only played
-    where all is; test_viewport.py reads that from the source."""
+    where all is, and what makes a Fluid domain where Blender can; test_viewport.py reads that from
+    the source."""
     def mark(function):
         scenarios[function.__name__] = function, scene
         return function

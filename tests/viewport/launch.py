@@ -31,13 +31,13 @@ class Played(NamedTuple):
 
 
 def scenarios(theme):
-    """The names of a theme's scenarios, and whether they are slow: the marks of its functions."""
+    """The names of a theme's scenarios, and the marks of their functions by name."""
     found = {}
     for node in ast.parse((HERE / f"{theme}.py").read_text(encoding="utf-8")).body:
         for mark in getattr(node, "decorator_list", []):
             if isinstance(mark, ast.Call) and mark.func.id == "scenario":
                 options = {word.arg: ast.literal_eval(word.value) for word in mark.keywords}
-                found[node.name] = options.get("slow", False)
+                found[node.name] = {name for name, value in options.items() if value is True}
     return found
 
 

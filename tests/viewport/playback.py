@@ -100,3 +100,57 @@ def volume_sequence():
         bpy.data.objects.remove(bpy.data.objects["Ball"])  # lets the files go
         yield from settled()
     return {"apart": found, "frames": len(frames), "shown": len(set(scenes))}
+
+
+def smoking(folder):
+    """A gas domain of few cells with a ball that smokes in it, simulated while it plays."""
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.4, location=(0.0, 0.0, 0.6))
+    ball = bpy.context.object
+    ball.modifiers.new("Fluid", 'FLUID').fluid_type = 'FLOW'
+    flow = ball.modifiers["Fluid"].flow_settings
+    flow.flow_type, flow.flow_behavior, flow.density = 'SMOKE', 'INFLOW', 4.0
+    ball.hide_render = True
+    bpy.ops.mesh.primitive_cube_add(size=2.0, location=(0.0, 0.0, 1.0))
+    domain = bpy.context.object
+    domain.name = "Domain"
+    domain.modifiers.new("Fluid", 'FLUID').fluid_type = 'DOMAIN'
+    settings = domain.modifiers["Fluid"].domain_settings
+    settings.domain_type, settings.resolution_max = 'GAS', 16
+    settings.cache_type, settings.cache_directory = 'REPLAY', str(folder)
+    settings.cache_frame_start, settings.cache_frame_end = 1, 40
+    smoke = bpy.data.materials.new("Smoke")
+    smoke.use_nodes = True
+    tree = smoke.node_tree
+    tree.nodes.clear()
+    volume = tree.nodes.new("ShaderNodeVolumePrincipled")
+    volume.inputs["Density"].default_value = 8.0
+    tree.links.new(volume.outputs["Volume"],
+                   tree.nodes.new("ShaderNodeOutputMaterial").inputs["Volume"])
+    domain.data.materials.append(smoke)
+    fog = bpy.data.objects["Fog"]
+    fog.hide_viewport = fog.hide_render = True
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 40
+    bpy.context.scene.frame_set(1)
+
+
+@scenario(fluid=True)
+def simulation():
+    """Smoke that is simulated while it plays is seen to rise."""
+    area = yield from alone()
+    region, = regions(area)
+    from_the_front(area)
+    with tempfile.TemporaryDirectory() as folder:
+        smoking(Path(folder))
+        yield from rendered_views()
+        first = shown(region)
+        with at(area):
+            frames, _, draws = yield from played(region, 6.0)
+        scenes = [values["scene"] for values in draws]
+        assert len(set(frames)) > 8, f"it did not play: {frames}"
+        assert len(set(scenes)) > 4, f"pictures of {len(set(scenes))} frames in 6 s"
+        yield from settled()
+        different(shown(region), first, "after a while")
+        found = as_rendered(region, "the simulation where it stopped")
+        bpy.data.objects.remove(bpy.data.objects["Domain"])
+        yield from settled()
+    return {"apart": found, "frames": len(frames), "shown": len(set(scenes))}

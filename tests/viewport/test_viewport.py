@@ -18,10 +18,15 @@ QUIT_AFTER_S = 0.0, 0.3, 1.0, 3.0
 
 
 def names_of(theme):
-    return [name for name, slow in launch.scenarios(theme).items() if SLOW or not slow]
+    return [name for name, marks in launch.scenarios(theme).items() if SLOW or "slow" not in marks]
 
 
-SCENARIOS = [(theme, name) for theme in THEMES for name in names_of(theme)]
+def marks_of(theme, name):
+    return [pytest.mark.fluid] if "fluid" in launch.scenarios(theme)[name] else []
+
+
+SCENARIOS = [pytest.param(theme, name, marks=marks_of(theme, name))
+             for theme in THEMES for name in names_of(theme)]
 
 
 @pytest.fixture

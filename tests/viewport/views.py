@@ -2,6 +2,7 @@
 """Scenarios: every kind of view, and what artists do to one."""
 
 import bpy
+import numpy as np
 from drive import (
     SIZE,
     alone,
@@ -313,3 +314,31 @@ def large_interface():
     bpy.context.scene.render.preview_pixel_size = '1'
     yield from settled()
     return as_rendered(region, "interface at 2")
+
+
+@scenario()
+def statistics():
+    """In the corner, when asked for: samples, stages, lattices, memory; and warnings always."""
+    area, region = yield from alone_rendered()
+    view, settings = views()[0], bpy.context.scene.brume
+    assert view.corner(settings) == ""
+    settings.show_statistics = True
+    yield from settled()
+    said = view.corner(settings)
+    for word in (f"Sample {settings.viewport_samples}/{settings.viewport_samples}", "march",
+                 "volumes", "light", "MiB"):
+        assert word in said, said
+    area.spaces.active.overlay.show_overlays = True  # with them Blender shows it
+    yield from settled()
+    before = shown(region)
+    settings.show_statistics = False
+    yield from settled()
+    height, width = before.shape[:2]
+    corner = np.abs(shown(region) - before)[:height // 3, :width].max(2)
+    assert (corner > 0.1).sum() > 200, "it is not shown"
+    tree = bpy.data.objects["Floor"].active_material.node_tree
+    texture = tree.nodes.new("ShaderNodeTexVoronoi")
+    surface = next(node for node in tree.nodes if node.bl_idname.startswith("ShaderNodeBsdf"))
+    tree.links.new(texture.outputs["Color"], surface.inputs[0])
+    yield from settled()
+    assert "Voronoi" in view.corner(settings), view.corner(settings)

@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long the add-on takes to export one edit of a large scene, and the whole; one JSON line each:
+"""How long the add-on takes to export one edit of a large scene, and the whole; appends a JSON line
+to out/bench/export.jsonl:
 
     scripts/blender -b --factory-startup -P bench/export.py
 """
 
 import json
+import sys
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
 from brume import native
 from brume.export import changes, scene
 from brume.export.target import Target
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from place import ROOT, here
 
 OBJECTS, MESHES, SIDE, INSTANCES = 1000, 100, 224, 20000
 REPEATS = 5
@@ -74,7 +80,8 @@ EDITS = {"nothing": lambda: None, "lamp moved": lambda: shift("Lamp 0"),
          "material's colour": color, "large mesh edited": stretch}
 
 
-def measure(case, target, listener):
+def measure(target, listener):
+    """Milliseconds of each edit, the best of some."""
     def export(changed):
         depsgraph = bpy.context.evaluated_depsgraph_get()
         began = time.perf_counter()
@@ -89,12 +96,12 @@ def measure(case, target, listener):
             edit()
             bpy.context.view_layer.update()
             times[name].append(export(listener.take()))
-    for name, taken in times.items():
-        print(json.dumps({"case": case, "edit": name,
-                          "export_ms": round(min(taken) * 1000, 2)}), flush=True)
+    return {name: round(min(taken) * 1000, 2) for name, taken in times.items()}
 
 
 def main():
+    line = {"bench": "export", **here(), "blender": bpy.app.version_string,
+            "triangles": 2 * (SIDE - 1) ** 2, "repeats": REPEATS, "export_ms": {}}
     device = native.Device()
     for case, more in ((f"{OBJECTS} objects", None), (f"and {INSTANCES} instances", instance)):
         build()
@@ -102,9 +109,14 @@ def main():
             more()
         target = Target(native.Scene(device))
         listener = changes.Changes(bpy.context.scene, bpy.context.view_layer)
-        measure(case, target, listener)
+        line["export_ms"][case] = measure(target, listener)
         target.scene.close()
     device.close()
+    path = Path(ROOT) / "out" / "bench" / "export.jsonl"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a", encoding="utf-8") as file:
+        print(json.dumps(line), file=file)
+    print(json.dumps(line))
 
 
 main()

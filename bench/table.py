@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the Markdown tables of the docs from the JSON lines of bench/peers.py or viewport.py.
+"""Makes the Markdown tables of the docs from the JSON lines of bench/peers.py, viewport.py or
+export.py.
 
     python3 bench/table.py FILE.jsonl [--into docs/PAGE.md]
 
 Takes the newest line of each scene, resolution, engine and device. With --into, the tables replace
-what stands between <!-- bench:peers --> and <!-- /bench:peers -->, or bench:viewport, in the page.
+what stands between <!-- bench:peers --> and <!-- /bench:peers -->, or bench:viewport or
+bench:export, in the page.
 """
 import argparse
 import json
@@ -118,6 +120,19 @@ def page(groups):
             yield ''
 
 
+def export_page(lines):
+    line = lines[-1]
+    times = line['export_ms']
+    yield (f'Blender {line["blender"]}; {line["processor"]}, {line["threads"]} threads; commit '
+           f'{version(line)}. Milliseconds, the best of {line["repeats"]}.')
+    yield ''
+    yield row('', *times)
+    yield row('---', *['---:'] * len(times))
+    for edit in next(iter(times.values())):
+        yield row(edit, *(f'{case[edit]:.1f}' for case in times.values()))
+    yield ''
+
+
 PAGES = {'peers': page, 'viewport': viewport_page}
 
 
@@ -128,7 +143,7 @@ def main():
     options = parser.parse_args()
     lines = read(options.lines)
     bench = lines[-1].get('bench', 'peers')
-    text = '\n'.join(PAGES[bench](newest(lines)))
+    text = '\n'.join(export_page(lines) if bench == 'export' else PAGES[bench](newest(lines)))
     if not options.into:
         print(text)
         return

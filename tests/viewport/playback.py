@@ -117,7 +117,7 @@ def smoking(folder):
     settings = domain.modifiers["Fluid"].domain_settings
     settings.domain_type, settings.resolution_max = 'GAS', 16
     settings.cache_type, settings.cache_directory = 'REPLAY', str(folder)
-    settings.cache_frame_start, settings.cache_frame_end = 1, 40
+    settings.cache_frame_start, settings.cache_frame_end = 1, 250
     smoke = bpy.data.materials.new("Smoke")
     smoke.use_nodes = True
     tree = smoke.node_tree
@@ -129,7 +129,8 @@ def smoking(folder):
     domain.data.materials.append(smoke)
     fog = bpy.data.objects["Fog"]
     fog.hide_viewport = fog.hide_render = True
-    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 40
+    # Longer than it plays: at its beginning there is no smoke.
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 250
     bpy.context.scene.frame_set(1)
 
 

@@ -32,7 +32,7 @@ def main():
     parser.add_argument('--out', default=os.path.join(ROOT, 'out', 'bench', 'viewport.jsonl'))
     options = parser.parse_args()
     where = here()
-    run = launch.play('latency', [SCENARIO])
+    run = launch.play('latency', [SCENARIO], BRUME_SLOW='1')
     result = run.results.get(SCENARIO)
     if result is None or result['error']:
         sys.exit(f'{result["error"] if result else run.said}\nBlender ended with {run.status}')

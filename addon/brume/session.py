@@ -105,8 +105,8 @@ def leave(name):
 
 
 def drop(name, wait=True):
-    """Frees a scene that is no longer needed. The library first lets all jobs end that were begun
-    before, a long render's too: wait=False leaves that to a thread."""
+    """Frees a scene that is no longer needed. The library first lets the step end that it is at, be
+    it another scene's: wait=False leaves that to a thread."""
     with _lock:
         dropped = _stages.pop(name, None)
         if dropped is None:

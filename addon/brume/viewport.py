@@ -223,12 +223,16 @@ class View:
             return False
         if not self._news():
             return True
+        self.notified = self.redraw()
+        return False
+
+    def redraw(self):
+        """Asks Blender for a redraw; False if it has let go of the engine."""
         try:
             self.engine().tag_redraw()
-        except (AttributeError, ReferenceError):  # Blender has let go of the engine
+        except (AttributeError, ReferenceError):
             return False
-        self.notified = True
-        return False
+        return True
 
     def close(self):
         self._drop_job()
@@ -326,8 +330,8 @@ class View:
     def _tell_others(self):
         """Blender redraws all views after a change, but not after what only a look finds."""
         for view in views():
-            if view is not self and view.stage is self.stage and view.engine() is not None:
-                view.engine().tag_redraw()
+            if view is not self and view.stage is self.stage:
+                view.redraw()
 
     def _wish(self, engine, context, depsgraph):
         scene_eval = depsgraph.scene_eval

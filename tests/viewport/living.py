@@ -165,6 +165,15 @@ def two_windows():
     return as_camera_sees(regions(view_area())[0], "the first window")
 
 
+def escaped(region):
+    """Breaks off the render by key; gives the seconds until it ended."""
+    cancelled = count_of("render_cancel")
+    asked = time.perf_counter()
+    yield from press_in(region, "Escape")
+    yield heard("render_cancel", cancelled + 1)
+    return events[-1][1] - asked
+
+
 @scenario()
 def final_render_beside():
     """F12 while the view renders: the view goes on, Escape ends the render, and what the view
@@ -188,11 +197,7 @@ def final_render_beside():
     assert not views() and not stages()
     shade('RENDERED')
     yield pictured()
-    cancelled = count_of("render_cancel")
-    asked = time.perf_counter()
-    yield from press_in(region, "Escape")
-    yield heard("render_cancel", cancelled + 1)
-    waited = events[-1][1] - asked
+    waited = yield from escaped(region)
     scene.brume.samples = 4
     yield from f12()
     yield from rest()
@@ -210,14 +215,11 @@ def f12_in_the_window():
     region, = regions(area)
     scene = bpy.context.scene
     scene.brume.samples = ENDLESS
-    cancelled, begun = count_of("render_cancel"), count_of("render_pre")
+    begun = count_of("render_pre")
     yield from press_in(region, "F12")
     yield heard("render_pre", begun + 1)
     yield 2.0
-    asked = time.perf_counter()
-    yield from press_in(region, "Escape")
-    yield heard("render_cancel", cancelled + 1)
-    waited = events[-1][1] - asked
+    waited = yield from escaped(region)
     scene.brume.samples = 4
     yield from f12()
     picture = saved_render()

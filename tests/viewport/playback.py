@@ -32,22 +32,29 @@ def written_sequence(folder):
     bpy.data.volumes.remove(data)
 
 
-def sequence_in_the_cube(folder):
-    """In place of the cube of fog."""
-    written_sequence(folder)
-    fog = bpy.data.objects["Fog"]
-    fog.hide_viewport = fog.hide_render = True
-    volume = bpy.data.volumes.new("Ball")
-    volume.filepath = str(folder / "ball_0001.vdb")
-    volume.is_sequence, volume.frame_duration, volume.frame_start = True, FRAMES, 1
-    volume.sequence_mode = 'REPEAT'
+def replace_fog(data, density):
+    """Makes smoke of that, and hides the cube of fog."""
     smoke = bpy.data.materials.new("Smoke")
     smoke.use_nodes = True
     tree = smoke.node_tree
     tree.nodes.clear()
-    tree.links.new(tree.nodes.new("ShaderNodeVolumePrincipled").outputs["Volume"],
+    volume = tree.nodes.new("ShaderNodeVolumePrincipled")
+    volume.inputs["Density"].default_value = density
+    tree.links.new(volume.outputs["Volume"],
                    tree.nodes.new("ShaderNodeOutputMaterial").inputs["Volume"])
-    volume.materials.append(smoke)
+    data.materials.append(smoke)
+    fog = bpy.data.objects["Fog"]
+    fog.hide_viewport = fog.hide_render = True
+
+
+def sequence_in_the_cube(folder):
+    """In place of the cube of fog."""
+    written_sequence(folder)
+    volume = bpy.data.volumes.new("Ball")
+    volume.filepath = str(folder / "ball_0001.vdb")
+    volume.is_sequence, volume.frame_duration, volume.frame_start = True, FRAMES, 1
+    volume.sequence_mode = 'REPEAT'
+    replace_fog(volume, 1.0)
     ob = bpy.data.objects.new("Ball", volume)
     ob.location.z = 1.0
     bpy.context.scene.collection.objects.link(ob)
@@ -118,17 +125,7 @@ def smoking(folder):
     settings.domain_type, settings.resolution_max = 'GAS', 16
     settings.cache_type, settings.cache_directory = 'REPLAY', str(folder)
     settings.cache_frame_start, settings.cache_frame_end = 1, 250
-    smoke = bpy.data.materials.new("Smoke")
-    smoke.use_nodes = True
-    tree = smoke.node_tree
-    tree.nodes.clear()
-    volume = tree.nodes.new("ShaderNodeVolumePrincipled")
-    volume.inputs["Density"].default_value = 8.0
-    tree.links.new(volume.outputs["Volume"],
-                   tree.nodes.new("ShaderNodeOutputMaterial").inputs["Volume"])
-    domain.data.materials.append(smoke)
-    fog = bpy.data.objects["Fog"]
-    fog.hide_viewport = fog.hide_render = True
+    replace_fog(domain.data, 8.0)
     # Longer than it plays: at its beginning there is no smoke.
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 250
     bpy.context.scene.frame_set(1)

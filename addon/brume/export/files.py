@@ -9,7 +9,7 @@ import threading
 from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
 
-from ..native import BrumeError, Grid, vdb_list
+from ..native import Grid, vdb_list
 
 # Of grids that no volume shows at present, so that a sequence that loops is read once.
 KEPT_BYTES = 256 << 20
@@ -34,6 +34,11 @@ def shutdown():
         _pool = None
 
 
+def grid_infos(path):
+    """What the library tells of each grid in a file, by name."""
+    return {info.name.decode(errors="replace"): info for info in vdb_list(path)}
+
+
 class File:
     """A .vdb file as it was at one time: its list of grids, and those that were read."""
 
@@ -45,16 +50,11 @@ class File:
 
     def read(self, names):
         """Lists the grids, and reads those of these names that there are; raises BrumeError."""
-        try:
-            if self.infos is None:
-                self.infos = {info.name.decode(errors="replace"): info
-                              for info in vdb_list(self.path)}
-            for name in names:
-                if name in self.infos and name not in self.grids:
-                    self.grids[name] = Grid.load_vdb(self.path, name)
-        except BrumeError as error:
-            self.error = error
-            raise
+        if self.infos is None:
+            self.infos = grid_infos(self.path)
+        for name in names:
+            if name in self.infos and name not in self.grids:
+                self.grids[name] = Grid.load_vdb(self.path, name)
 
     def has(self, names):
         return self.infos is not None and all(

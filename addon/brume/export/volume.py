@@ -16,6 +16,7 @@ from ..compat import identity
 from ..native import BrumeError, Grid, vdb_list
 from . import material as materials
 from . import nodes
+from .files import grid_infos
 from .volume_shader import compile_volume, default_program
 
 
@@ -65,7 +66,7 @@ class _Scratch:
         self.target, self.path = target, path
         digest = hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest()
         self.stamp = "memory", digest
-        self.infos = {info.name.decode(errors="replace"): info for info in vdb_list(path)}
+        self.infos = grid_infos(path)
 
     def grids(self, names):
         return [self.target.grid((*self.stamp, name), partial(Grid.load_vdb, self.path, name))

@@ -21,7 +21,7 @@ WRONG = re.compile(r"Traceback|\bError\b|ERROR|[Aa]ssert|GL error|GL_INVALID|Seg
 
 class Played(NamedTuple):
     status: int
-    said: str       # both of Blender's streams
+    said: str       # both of Blender's streams, and where it crashed if it did
     results: dict   # by the scenario's name: its values, error and seconds; none if not got to
 
     @property
@@ -53,6 +53,8 @@ def play(theme, names, **environment):
              "-P", HERE / "play.py", "--", theme, results, *names],
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
             timeout=TIMEOUT_S, env=os.environ | {"TMPDIR": folder} | environment)
+        crashes = "".join(path.read_text(errors="replace")
+                          for path in Path(folder).glob("*.crash.txt"))
         lines = results.read_text(encoding="utf-8").splitlines() if results.exists() else []
         found = {entry["name"]: entry for entry in map(json.loads, lines)}
-    return Played(done.returncode, done.stdout, found)
+    return Played(done.returncode, done.stdout + crashes, found)

@@ -53,7 +53,9 @@ def regions(area, kind='WINDOW'):
 
 
 def at(area, region=None, window=None):
-    """The context of operators that work in an area."""
+    """The context of operators that work in an area. To be left before the scenario waits: while
+    a context is overridden, Blender's main loop looks into Python's dictionary of it without the
+    interpreter's lock, which crashes when another thread runs Python (seen in 3.4)."""
     return bpy.context.temp_override(window=window or windows()[0], area=area,
                                      region=region or regions(area)[-1])
 

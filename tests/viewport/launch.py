@@ -5,6 +5,7 @@ import ast
 import json
 import os
 import re
+import signal
 import subprocess
 import tempfile
 from pathlib import Path
@@ -20,7 +21,7 @@ WRONG = re.compile(r"Traceback|\bError\b|ERROR|[Aa]ssert|GL error|GL_INVALID|Seg
 
 
 class Played(NamedTuple):
-    status: int
+    status: int     # None: it had to be ended
     said: str       # both of Blender's streams, and where it crashed if it did
     results: dict   # by the scenario's name: its values, error and seconds; none if not got to
 
@@ -42,19 +43,28 @@ def scenarios(theme):
 
 
 def play(theme, names, **environment):
-    """Plays scenarios of a theme in one Blender."""
+    """Plays scenarios of a theme in one Blender. One that takes too long is ended, with None for
+    its status; play.py has it say before where it stood."""
     width, height = (str(side) for side in WINDOW)
-    with tempfile.TemporaryDirectory() as folder:
-        results = Path(folder) / "results.jsonl"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        results, said = folder / "results.jsonl", folder / "said.txt"
         # xvfb-run mixes both streams into one; what Blender leaves at its end goes into the folder.
-        done = subprocess.run(
-            ["xvfb-run", "-a", "-s", f"-ac -screen 0 {width}x{height}x24",
-             ROOT / "scripts" / "blender", "--factory-startup", "-p", "0", "0", width, height,
-             "-P", HERE / "play.py", "--", theme, results, *names],
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
-            timeout=TIMEOUT_S, env=os.environ | {"TMPDIR": folder} | environment)
-        crashes = "".join(path.read_text(errors="replace")
-                          for path in Path(folder).glob("*.crash.txt"))
+        with open(said, "wb") as file, subprocess.Popen(
+                ["xvfb-run", "-a", "-s", f"-ac -screen 0 {width}x{height}x24",
+                 ROOT / "scripts" / "blender", "--factory-startup", "-p", "0", "0", width, height,
+                 "-P", HERE / "play.py", "--", theme, results, *names],
+                stdout=file, stderr=subprocess.STDOUT, start_new_session=True,
+                env=os.environ | {"TMPDIR": name} | environment) as process:
+            try:
+                status = process.wait(TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                status = None
+            finally:
+                if process.returncode is None:
+                    os.killpg(process.pid, signal.SIGKILL)  # the display and Blender too
+        told = "".join(path.read_text(errors="replace")
+                       for path in [said, *folder.glob("*.crash.txt")])
         lines = results.read_text(encoding="utf-8").splitlines() if results.exists() else []
         found = {entry["name"]: entry for entry in map(json.loads, lines)}
-    return Played(done.returncode, done.stdout + crashes, found)
+    return Played(status, told, found)

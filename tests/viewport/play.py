@@ -5,6 +5,7 @@ and quits as a user does. Started by launch.py:
     blender --python play.py -- THEME RESULTS.jsonl NAME...
 """
 
+import faulthandler
 import importlib
 import json
 import sys
@@ -19,6 +20,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import blenders  # noqa: E402
 import drive  # noqa: E402
+import launch  # noqa: E402
 
 TICK_S = 0.03
 PATIENCE_S = 150.0
@@ -99,6 +101,11 @@ class Player:
 
 for handler in ("render_pre", "render_complete", "render_cancel"):
     drive.note(handler)
+faulthandler.dump_traceback_later(launch.TIMEOUT_S - 10)
+# Blender notes for the whole process that Python may not write while it draws a panel, and a render
+# that begins in its thread meanwhile makes that stay: no timer could go on (docs/blenders.md). So
+# threads take turns only where one waits.
+sys.setswitchinterval(1.0)
 theme, results, *names = sys.argv[sys.argv.index("--") + 1:]
 bpy.context.preferences.view.show_splash = False
 bpy.app.timers.register(Player(show(theme, results, names)).tick, first_interval=1.0,

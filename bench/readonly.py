@@ -2,7 +2,8 @@
 """Shows a flaw of Blender around engines in Python (docs/blenders.md): previews of materials
 that begin while panels are drawn leave Python unable to write. In a window, with an empty scene:
 
-    xvfb-run scripts/blender --factory-startup -P bench/readonly.py -- BRUME 0.0001
+    xvfb-run -s "-screen 0 1280x960x24" scripts/blender --factory-startup -p 0 0 1280 960 \
+        -P bench/readonly.py -- BRUME 0.0001
 
 The engine, and the seconds after which Python's threads take turns; Python's own are 0.005. Says
 after how many previews it happened, and quits with 1; or that it did not, with 0.
@@ -13,9 +14,9 @@ import sys
 
 import bpy
 
-PREVIEWS = 100
+PREVIEWS = 40
 engine, interval_s = sys.argv[-2], float(sys.argv[-1])
-previews = 0
+previews = ticks = 0
 
 
 def told(sentence, status):
@@ -24,20 +25,22 @@ def told(sentence, status):
 
 
 def tick():
-    global previews
+    global previews, ticks
     try:
         bpy.context.scene.render.engine = engine
     except AttributeError:
         told(f"read-only after {previews} previews", 1)
     if previews == PREVIEWS:
         told(f"never in {previews} previews", 0)
-    material = bpy.data.materials.new("Preview")
-    material.use_nodes = True
-    material.asset_generate_preview()
-    previews += 1
+    ticks += 1
+    if ticks % 4 == 0:
+        material = bpy.data.materials.new("Preview")
+        material.use_nodes = True
+        material.asset_generate_preview()
+        previews += 1
     for area in bpy.context.window_manager.windows[0].screen.areas:
         area.tag_redraw()
-    return 0.2
+    return 0.05
 
 
 sys.setswitchinterval(interval_s)

@@ -104,7 +104,7 @@ for handler in ("render_pre", "render_complete", "render_cancel"):
 faulthandler.dump_traceback_later(launch.TIMEOUT_S - 10)
 # Blender notes for the whole process that Python may not write while it draws a panel, and a render
 # that begins in its thread meanwhile makes that stay: no timer could go on (docs/blenders.md). So
-# threads take turns only where one waits.
+# threads take turns only where one waits, or after longer than a drawing takes.
 sys.setswitchinterval(1.0)
 theme, results, *names = sys.argv[sys.argv.index("--") + 1:]
 bpy.context.preferences.view.show_splash = False

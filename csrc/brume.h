@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* Raised by every change to a struct, an enumerator or a function below. */
-#define BRUME_ABI 2u
+#define BRUME_ABI 3u
 
 BRUME_API uint32_t brume_abi(void);
 
@@ -252,15 +252,27 @@ typedef struct brume_volume_program {
     uint32_t emission;               /* W/(sr m^3) */
 } brume_volume_program;
 
-/* A medium: grids in an object's space, or the inside of a closed mesh. */
+/* One term of a medium that is a sum of Gaussians: amplitude * exp(-scale^2 |x - center|^2) at x in
+ * object space. It stays round under any transform, which scales it by the cube root of its
+ * determinant. Beyond 3 / scale of its centre it counts as 0. */
+typedef struct brume_gaussian {
+    float center[3];
+    float scale;                     /* above 0 */
+    float color[3];
+    float amplitude;                 /* 0 and above */
+} brume_gaussian;
+
+/* A medium: grids in an object's space, the inside of a closed mesh, or a sum of Gaussians. The
+ * program of Gaussians reads the sum of their amplitudes as grid 0, and as grid 1 the mean of their
+ * colours, weighted by those. */
 typedef struct brume_volume {
     const char *name;                /* for messages */
     brume_grid *const *grids;        /* what BRUME_OP_GRID numbers; retained, may be NULL entries,
                                         which read as 0 */
-    const float *positions;          /* mesh: 3 floats a vertex, object space; NULL for grids */
+    const float *positions;          /* mesh: 3 floats a vertex, object space; else NULL */
     const uint32_t *triangles;       /* mesh: 3 indices a triangle */
-    uint32_t grid_count, vertex_count, triangle_count;
-    uint32_t reserved;
+    const brume_gaussian *gaussians; /* NULL for grids and meshes */
+    uint32_t grid_count, vertex_count, triangle_count, gaussian_count;
     brume_volume_program program;
     float world_from_object[16];
     float scale;                     /* multiplies all coefficients; 0 means 1 */
@@ -411,6 +423,16 @@ typedef enum brume_method {
     BRUME_METHOD_COUNT = 1
 } brume_method;
 
+/* How OPV finds the optical depths from the lamps to the nodes of its lattice. */
+typedef enum brume_depths {
+    BRUME_DEPTHS_PROPAGATED = 0,     /* from node to node, outwards from the lamp */
+    BRUME_DEPTHS_MARCHED = 1,        /* each by a march of its own: the reference, slower */
+    BRUME_DEPTHS_PAPER = 2,          /* as 0, but the increments of the paper, too large where light
+                                        runs askew to the lattice: for comparison */
+    BRUME_DEPTHS_ITERATED = 3,       /* as 2, all nodes in every iteration: for comparison */
+    BRUME_DEPTHS_COUNT = 4
+} brume_depths;
+
 typedef struct brume_settings {
     uint32_t method;
     int32_t medium_resolution;       /* cells along the longest side; 0: 128 */
@@ -420,6 +442,8 @@ typedef struct brume_settings {
     int32_t light_samples;           /* shadow maps spread over each lamp; 0: 8 */
     int32_t world_samples;           /* directions that stand for the world's light; 0: 128 */
     float step;                      /* march step in cells of the medium; 0: 1 */
+    uint32_t depths;                 /* brume_depths */
+    uint32_t reserved;
     uint64_t memory_budget;          /* bytes on the GPU; 0: 2 GiB */
 } brume_settings;
 

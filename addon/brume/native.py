@@ -27,12 +27,13 @@ from pathlib import Path
 
 import numpy as np
 
-ABI = 2
+ABI = 3
 PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONMENT",
           "TRANSMITTANCE")
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3)
 STAGES = ("upload", "medium", "shadow", "transport", "gbuffer", "shade", "march", "passes")
 METHODS = {"OPV": 0}
+DEPTHS = {"PROPAGATED": 0, "MARCHED": 1, "PAPER": 2, "ITERATED": 3}
 KINDS = {"mesh": 0, "instances": 1, "material": 2, "image": 3, "light": 4, "volume": 5}
 JOB_QUEUED, JOB_RUNNING, JOB_DONE, JOB_FAILED, JOB_CANCELLED = range(5)
 VISIBLE_CAMERA, VISIBLE_SHADOW, VISIBLE_HOLDOUT = 1, 2, 4
@@ -98,8 +99,9 @@ class VolumeProgram(Structure):
 
 class Volume(Structure):
     _fields_ = [("name", c_char_p), ("grids", POINTER(c_void_p)), ("positions", c_void_p),
-                ("triangles", c_void_p), ("grid_count", c_uint32), ("vertex_count", c_uint32),
-                ("triangle_count", c_uint32), ("reserved", c_uint32), ("program", VolumeProgram),
+                ("triangles", c_void_p), ("gaussians", c_void_p), ("grid_count", c_uint32),
+                ("vertex_count", c_uint32), ("triangle_count", c_uint32),
+                ("gaussian_count", c_uint32), ("program", VolumeProgram),
                 ("world_from_object", Mat4), ("scale", c_float), ("reserved2", c_float)]
 
 
@@ -149,7 +151,8 @@ class Settings(Structure):
     _fields_ = [("method", c_uint32), ("medium_resolution", c_int32),
                 ("lattice_resolution", c_int32), ("iterations", c_int32),
                 ("shadow_resolution", c_int32), ("light_samples", c_int32),
-                ("world_samples", c_int32), ("step", c_float), ("memory_budget", c_uint64)]
+                ("world_samples", c_int32), ("step", c_float), ("depths", c_uint32),
+                ("reserved", c_uint32), ("memory_budget", c_uint64)]
 
 
 class View(Structure):
@@ -496,11 +499,13 @@ class Scene(Handle):
             Vec3(*sigma_a), Vec3(*emission), g, reach)))
 
     def set_volume(self, key, *, name, program, world_from_object, scale=1.0, grids=(),
-                   positions=None, triangles=None):
+                   positions=None, triangles=None, gaussians=None):
         """program: has instructions (op, dst, a, b, c, value), ramps (n, 256, 3) and the four
-        result registers. grids: Grid or None each."""
+        result registers. grids: Grid or None each. gaussians: (n, 8): center, scale, color,
+        amplitude."""
         positions = _array(positions, np.float32)
         triangles = _array(triangles, np.uint32)
+        gaussians = _array(gaussians, np.float32)
         ramps = _array(program.ramps, np.float32)
         code = (Instruction * max(1, len(program.instructions)))()
         for slot, (op, dst, a, b, c, value) in zip(code, program.instructions):
@@ -508,8 +513,9 @@ class Scene(Handle):
             slot.value = Vec3(*value)
         handles = (c_void_p * max(1, len(grids)))(*[g.pointer if g else None for g in grids])
         library().scene_set_volume(self.pointer, key, byref(Volume(
-            name.encode(), handles, _pointer(positions), _pointer(triangles), len(grids),
-            _count(positions, 3), _count(triangles, 3), 0,
+            name.encode(), handles, _pointer(positions), _pointer(triangles),
+            _pointer(gaussians), len(grids), _count(positions, 3), _count(triangles, 3),
+            _count(gaussians, 8),
             VolumeProgram(code, _pointer(ramps), len(program.instructions), len(program.ramps),
                           program.sigma_s, program.sigma_a, program.g, program.emission),
             matrix(world_from_object), scale)))

@@ -97,6 +97,10 @@ class VolumeProgram(Structure):
                 ("sigma_a", c_uint32), ("g", c_uint32), ("emission", c_uint32)]
 
 
+class Gaussian(Structure):
+    _fields_ = [("center", Vec3), ("scale", c_float), ("color", Vec3), ("amplitude", c_float)]
+
+
 class Volume(Structure):
     _fields_ = [("name", c_char_p), ("grids", POINTER(c_void_p)), ("positions", c_void_p),
                 ("triangles", c_void_p), ("gaussians", c_void_p), ("grid_count", c_uint32),
@@ -196,11 +200,11 @@ class ExrChannel(Structure):
 STRUCTS = {
     "brume_device_params": DeviceParams, "brume_device_info": DeviceInfo,
     "brume_grid_info": GridInfo, "brume_instruction": Instruction,
-    "brume_volume_program": VolumeProgram, "brume_volume": Volume, "brume_mesh": Mesh,
-    "brume_instances": Instances, "brume_material": Material, "brume_image": Image,
-    "brume_light": Light, "brume_world": World, "brume_settings": Settings, "brume_view": View,
-    "brume_stage_stats": StageStats, "brume_stats": Stats, "brume_job_status": JobStatus,
-    "brume_exr_channel": ExrChannel,
+    "brume_volume_program": VolumeProgram, "brume_gaussian": Gaussian, "brume_volume": Volume,
+    "brume_mesh": Mesh, "brume_instances": Instances, "brume_material": Material,
+    "brume_image": Image, "brume_light": Light, "brume_world": World, "brume_settings": Settings,
+    "brume_view": View, "brume_stage_stats": StageStats, "brume_stats": Stats,
+    "brume_job_status": JobStatus, "brume_exr_channel": ExrChannel,
 }
 
 _RESULT = object()  # marks a function that returns a brume_result

@@ -425,12 +425,14 @@ typedef enum brume_method {
 
 /* How OPV finds the optical depths from the lamps to the nodes of its lattice. */
 typedef enum brume_depths {
-    BRUME_DEPTHS_PROPAGATED = 0,     /* from node to node, outwards from the lamp */
+    BRUME_DEPTHS_PROPAGATED = 0,     /* from brick to brick, outwards from the lamp */
     BRUME_DEPTHS_MARCHED = 1,        /* each by a march of its own: the reference, slower */
-    BRUME_DEPTHS_PAPER = 2,          /* as 0, but the increments of the paper, too large where light
-                                        runs askew to the lattice: for comparison */
-    BRUME_DEPTHS_ITERATED = 3,       /* as 2, all nodes in every iteration: for comparison */
-    BRUME_DEPTHS_COUNT = 4
+    BRUME_DEPTHS_CORRECTED = 2,      /* for comparison: gathered from six neighbours, as the paper
+                                        has it, with increments as long as the step */
+    BRUME_DEPTHS_PAPER = 3,          /* for comparison: the paper's increments, too large where light
+                                        runs askew to the lattice */
+    BRUME_DEPTHS_ITERATED = 4,       /* for comparison: as 3, all nodes in every iteration */
+    BRUME_DEPTHS_COUNT = 5
 } brume_depths;
 
 typedef struct brume_settings {

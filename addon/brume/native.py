@@ -33,7 +33,7 @@ PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONME
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3)
 STAGES = ("upload", "medium", "shadow", "transport", "gbuffer", "shade", "march", "passes")
 METHODS = {"OPV": 0}
-DEPTHS = {"PROPAGATED": 0, "MARCHED": 1, "PAPER": 2, "ITERATED": 3}
+DEPTHS = {"PROPAGATED": 0, "MARCHED": 1, "CORRECTED": 2, "PAPER": 3, "ITERATED": 4}
 KINDS = {"mesh": 0, "instances": 1, "material": 2, "image": 3, "light": 4, "volume": 5}
 JOB_QUEUED, JOB_RUNNING, JOB_DONE, JOB_FAILED, JOB_CANCELLED = range(5)
 VISIBLE_CAMERA, VISIBLE_SHADOW, VISIBLE_HOLDOUT = 1, 2, 4
@@ -95,6 +95,10 @@ class VolumeProgram(Structure):
     _fields_ = [("instructions", POINTER(Instruction)), ("ramps", c_void_p),
                 ("instruction_count", c_uint32), ("ramp_count", c_uint32), ("sigma_s", c_uint32),
                 ("sigma_a", c_uint32), ("g", c_uint32), ("emission", c_uint32)]
+
+
+class Gaussian(Structure):
+    _fields_ = [("center", Vec3), ("scale", c_float), ("color", Vec3), ("amplitude", c_float)]
 
 
 class Volume(Structure):
@@ -196,11 +200,11 @@ class ExrChannel(Structure):
 STRUCTS = {
     "brume_device_params": DeviceParams, "brume_device_info": DeviceInfo,
     "brume_grid_info": GridInfo, "brume_instruction": Instruction,
-    "brume_volume_program": VolumeProgram, "brume_volume": Volume, "brume_mesh": Mesh,
-    "brume_instances": Instances, "brume_material": Material, "brume_image": Image,
-    "brume_light": Light, "brume_world": World, "brume_settings": Settings, "brume_view": View,
-    "brume_stage_stats": StageStats, "brume_stats": Stats, "brume_job_status": JobStatus,
-    "brume_exr_channel": ExrChannel,
+    "brume_volume_program": VolumeProgram, "brume_gaussian": Gaussian, "brume_volume": Volume,
+    "brume_mesh": Mesh, "brume_instances": Instances, "brume_material": Material,
+    "brume_image": Image, "brume_light": Light, "brume_world": World, "brume_settings": Settings,
+    "brume_view": View, "brume_stage_stats": StageStats, "brume_stats": Stats,
+    "brume_job_status": JobStatus, "brume_exr_channel": ExrChannel,
 }
 
 _RESULT = object()  # marks a function that returns a brume_result

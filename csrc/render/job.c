@@ -36,6 +36,7 @@ static brume_result check_settings(brume_settings *settings)
     REQUIRE(settings->shadow_resolution >= 16 && settings->shadow_resolution <= 8192);
     REQUIRE(settings->light_samples >= 1 && settings->light_samples <= 1024);
     REQUIRE(settings->world_samples >= 1 && settings->world_samples <= 1024);
+    REQUIRE(settings->depths < BRUME_DEPTHS_COUNT);
     REQUIRE(settings->step >= 0.05f && settings->step <= 100.0f);
     REQUIRE(settings->memory_budget >= 1 << 20);
     return BRUME_OK;

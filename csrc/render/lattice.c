@@ -4,6 +4,7 @@
 #include "base/result.h"
 #include "math/frame.h"
 #include "scene/pack.h"
+#include "transport/depths.h"
 
 #include <math.h>
 #include <string.h>
@@ -140,8 +141,9 @@ static uint64_t tau_bytes(const struct renderer *renderer)
 uint64_t lattice_depth_bytes(const struct renderer *renderer, const brume_settings *settings)
 {
     const uint64_t nodes = (uint64_t)settings->lattice_resolution + 3;
-    /* Twice: the last column of tiles may be nearly empty. */
-    return nodes * nodes * nodes * NODE_BYTES * 2 * ((uint64_t)renderer->shadows.light_count + 1);
+    /* Twice: the last column of tiles may be nearly empty. And what is needed beside them. */
+    return nodes * nodes * nodes * NODE_BYTES * 2 * ((uint64_t)renderer->shadows.light_count + 9) +
+           (1u << 20);
 }
 
 uint64_t lattice_sky_bytes(const brume_settings *settings)
@@ -181,7 +183,10 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
             frame->lattice_lower =
                 pack(medium->lower, nodes_of(&box, resolution, &frame->lattice_dims));
             if (layout_tiles(renderer, gpu->context.info.max_texture_3d) &&
-                tau_bytes(renderer) <= renderer->shares.depth)
+                tau_bytes(renderer) + depths_working_bytes(settings, renderer->shadows.lights,
+                                                           renderer->shadows.light_count, frame,
+                                                           renderer->tau_size) <=
+                    renderer->shares.depth)
                 break;
             if (resolution == 1)
                 return fail(BRUME_E_MEMORY,

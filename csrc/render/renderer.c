@@ -488,10 +488,11 @@ static brume_result run_stages(struct run *run)
                                   stages[BRUME_STAGE_SHADOW].revision,
                                   (uint64_t)settings->lattice_resolution,
                                   settings->method,
+                                  settings->depths,
                                   least(shares->depth, lattice_depth_bytes(renderer, settings)),
                                   least(shares->sky, lattice_sky_bytes(settings)),
                                   float_bits(snapshot->world.reach)};
-    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 7, work_transport));
+    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 8, work_transport));
     collect_warnings(run);
     return BRUME_OK;
 }

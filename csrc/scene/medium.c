@@ -5,6 +5,7 @@
 #include "base/result.h"
 #include "math/frame.h"
 #include "scene/resample.h"
+#include "scene/splat.h"
 #include "scene/voxelize.h"
 
 #include <math.h>
@@ -34,7 +35,7 @@ static double set_dims(struct medium_lattice *lattice, const double extent[3], d
     return product;
 }
 
-/* The box of all volumes; returns its longest side, 0 without volumes. */
+/* The box of all volumes; returns its longest side, 0 where none reaches anywhere. */
 static double joint_bounds(struct volume *const *volumes, uint32_t count, double lower[3],
                            double upper[3], double extent[3])
 {
@@ -46,11 +47,16 @@ static double joint_bounds(struct volume *const *volumes, uint32_t count, double
             lower[axis] = fmin(lower[axis], (double)volumes[i]->lower[axis]);
             upper[axis] = fmax(upper[axis], (double)volumes[i]->upper[axis]);
         }
-        extent[axis] = count ? upper[axis] - lower[axis] : 0.0;
+        extent[axis] = fmax(upper[axis] - lower[axis], 0.0);
         longest = fmax(longest, extent[axis]);
     }
     return longest;
 }
+
+/* Cells in a Gaussian's width (1 / scale). Means of such cells, interpolated linearly, are within
+ * 0.4 % of its peak everywhere: beside the peak it loses (width / cell)^-2, a quarter of that by
+ * the means and the rest by the interpolation between eight cells. */
+#define CELLS_PER_WIDTH 16.0
 
 /* Side of the smallest voxel of all volumes, m: cells smaller than that would hold nothing more.
  * 0 where a mesh gives the medium, whose shape any resolution makes better. */
@@ -70,6 +76,12 @@ static double finest_voxel(struct volume *const *volumes, uint32_t count)
                 finest = fmin(finest, sqrt((double)m[4 * column] * m[4 * column] +
                                            (double)m[4 * column + 1] * m[4 * column + 1] +
                                            (double)m[4 * column + 2] * m[4 * column + 2]));
+        }
+        for (uint32_t g = 0; g < volumes[i]->gaussian_count; ++g) {
+            double center[3];
+            const double scale =
+                gaussian_place(&volumes[i]->gaussians[g], volumes[i]->world_from_object, center);
+            finest = fmin(finest, 1.0 / (CELLS_PER_WIDTH * scale));
         }
     }
     return finest;
@@ -91,7 +103,7 @@ static void place(struct medium_lattice *lattice, struct volume *const *volumes,
     double lower[3], upper[3], extent[3];
     const double longest = joint_bounds(volumes, count, lower, upper, extent);
     /* Also false for a box so small that floats have no cells for it. */
-    if (count == 0 || !((float)(longest / resolution) > 0.0f))
+    if (!((float)(longest / resolution) > 0.0f))
         return;
 
     double cells = set_dims(lattice, extent, longest, resolution);
@@ -130,13 +142,16 @@ struct share {
     /* meshes */
     float *coverage;
     struct medium_sample constant;
+    /* Gaussians */
+    struct splats splats;
 };
 
 /* What a thread needs for a plane of a share. */
 struct worker {
     float *scratch;
-    float *means;  /* per grid a plane of 3 floats a cell */
-    float *inside; /* a plane: the part of each cell that counts */
+    double *sums;  /* Gaussians: a plane, as splats_add wants it */
+    float *means;  /* 3 floats a cell: per grid a plane, or a row of Gaussians */
+    float *inside; /* the part of each cell that counts: a plane, or a row of Gaussians */
     const float **rows;
     struct medium_sample *samples; /* a row */
 };
@@ -391,12 +406,93 @@ static brume_result add_grids(struct build *build, struct share *share)
                   : fail(BRUME_E_MEMORY, "no memory to resample volume '%s'", volume->name);
 }
 
+/* What the program reads in a row of cells, and the cells that the Gaussians fill. */
+static void splat_means(const double *sums, int32_t count, float *density, float *color,
+                        float *inside)
+{
+    for (int32_t i = 0; i < count; ++i, sums += 4) {
+        const float mean = (float)sums[3];
+        inside[i] = mean > 0.0f ? 1.0f : 0.0f;
+        for (int c = 0; c < 3; ++c) {
+            density[3 * i + c] = mean;
+            color[3 * i + c] = mean > 0.0f ? (float)(sums[c] / sums[3]) : 0.0f;
+        }
+    }
+}
+
+static void add_gaussian_plane(struct build *build, const struct share *share,
+                               struct worker *worker, int32_t k)
+{
+    const size_t splat_count = splats_in_plane(&share->splats, k);
+    if (splat_count == 0)
+        return;
+    const int32_t width = share->dims[0];
+    const size_t row = (size_t)width;
+    memset(worker->sums, 0, 4 * row * (size_t)share->dims[1] * sizeof *worker->sums);
+    for (size_t i = 0; i < splat_count && !stopped(build); ++i)
+        splats_add(&share->splats, k, i, worker->sums);
+
+    for (int32_t j = 0; j < share->dims[1] && !stopped(build); ++j) {
+        splat_means(worker->sums + 4 * row * (size_t)j, width, worker->means,
+                    worker->means + 3 * row, worker->inside);
+        int32_t from = 0, to = width;
+        while (from < to && worker->inside[from] <= 0.0f)
+            ++from;
+        while (from < to && worker->inside[to - 1] <= 0.0f)
+            --to;
+        if (from == to)
+            continue;
+        const float *rows[2] = {worker->means + 3 * from, worker->means + 3 * (width + from)};
+        volume_program_run(&share->volume->program, rows, (uint32_t)(to - from), worker->samples);
+        add_row(build, share, from, j, k, to - from, worker->samples, 1, worker->inside + from);
+    }
+}
+
+static brume_result add_gaussians(struct build *build, struct share *share)
+{
+    const struct volume *volume = share->volume;
+    const double cell = build->lattice->cell;
+    double lower[3];
+    for (int axis = 0; axis < 3; ++axis)
+        lower[axis] = build->lattice->lower[axis] + share->first[axis] * cell;
+    TRY(splats_init(&share->splats, volume->gaussians, volume->gaussian_count,
+                    volume->world_from_object, lower, cell, share->dims));
+    const size_t width = (size_t)share->dims[0];
+    bool memory = true;
+#pragma omp parallel reduction(&& : memory)
+    {
+        struct worker worker = {
+            .sums = malloc(4 * width * (size_t)share->dims[1] * sizeof *worker.sums),
+            .means = malloc(6 * width * sizeof *worker.means),
+            .inside = malloc(width * sizeof *worker.inside),
+            .samples = malloc(width * sizeof *worker.samples),
+        };
+        memory = worker.sums && worker.means && worker.inside && worker.samples;
+        /* A plane belongs to one thread: the same sums in the same order for any number. */
+#pragma omp for schedule(dynamic)
+        for (int32_t k = 0; k < share->dims[2]; ++k)
+            if (memory && !stopped(build))
+                add_gaussian_plane(build, share, &worker, k);
+        free(worker.sums);
+        free(worker.means);
+        free(worker.inside);
+        free(worker.samples);
+    }
+    return memory
+               ? BRUME_OK
+               : fail(BRUME_E_MEMORY, "no memory for the Gaussians of volume '%s'", volume->name);
+}
+
 static brume_result add_volume(struct build *build, const struct volume *volume)
 {
+    if (!(volume->lower[0] <= volume->upper[0]))
+        return BRUME_OK; /* reaches nowhere */
     struct share share = {.volume = volume};
     share_cells(build, &share);
-    const brume_result result =
-        volume->positions ? add_mesh(build, &share) : add_grids(build, &share);
+    const brume_result result = volume->positions   ? add_mesh(build, &share)
+                                : volume->gaussians ? add_gaussians(build, &share)
+                                                    : add_grids(build, &share);
+    splats_finish(&share.splats);
     free(share.coverage);
     for (uint32_t grid = 0; share.resamplers && grid < volume->grid_count; ++grid)
         resampler_finish(&share.resamplers[grid]);

@@ -16,17 +16,21 @@ struct volume {
     uint32_t grid_count;
     brume_grid **grids;              /* retained */
     uint32_t vertex_count, triangle_count;
-    float *positions;                /* NULL for grids */
+    float *positions;                /* NULL but for a mesh */
     uint32_t *triangles;
+    brume_gaussian *gaussians;       /* NULL but for those; none of amplitude 0 */
+    uint32_t gaussian_count;
     struct volume_program program;
     float world_from_object[16];
     float object_from_world[16];
     float scale;
-    float lower[3], upper[3];        /* world-axis bounds of what can be non-zero */
+    float lower[3], upper[3];        /* world-axis bounds of what can be non-zero; where nothing
+                                        can, infinite and the wrong way round */
 };
 
 /* Checks everything and copies; the errors name the volume. A grid volume without any grid, a
- * singular matrix, a mesh without triangles are errors. */
+ * singular matrix, a mesh without triangles, no Gaussians are errors; Gaussians that are all of
+ * amplitude 0 are a volume that reaches nowhere. */
 brume_result volume_create(const brume_volume *source, struct volume **out);
 struct volume *volume_retain(struct volume *volume);
 void volume_release(struct volume *volume);
@@ -43,8 +47,9 @@ struct medium_lattice {
     bool coarser;                    /* max_cells forced a lower resolution */
 };
 
-/* The resolution at which cells are as small as the smallest voxel of the grids: more cells would
- * show nothing more. INT32_MAX with a mesh, whose shape any resolution makes better. */
+/* The resolution at which cells are as small as the smallest voxel of the grids, or as the
+ * narrowest Gaussian needs: more cells would show nothing more. INT32_MAX with a mesh, whose shape
+ * any resolution makes better. */
 int32_t medium_useful_resolution(struct volume *const *volumes, uint32_t count);
 
 /* resolution: cells along the longest side of the volumes' joint bounds. max_cells: a limit that

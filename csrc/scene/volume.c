@@ -5,11 +5,15 @@
 #include "math/frame.h"
 #include "scene/medium.h"
 #include "scene/resample.h"
+#include "scene/splat.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* What a program of Gaussians may read: their density and their colour. */
+enum { GAUSSIAN_GRIDS = 2 };
 
 static brume_result check_transform(struct volume *volume)
 {
@@ -58,11 +62,6 @@ static brume_result copy_mesh(struct volume *volume, const brume_volume *source)
 
 static brume_result retain_grids(struct volume *volume, const brume_volume *source)
 {
-    uint32_t present = 0;
-    for (uint32_t i = 0; source->grids && i < source->grid_count; ++i)
-        present += source->grids[i] != NULL;
-    if (present == 0)
-        return fail(BRUME_E_ARGUMENT, "volume '%s' has neither a grid nor a mesh", volume->name);
     volume->grids = calloc(source->grid_count, sizeof *volume->grids);
     if (!volume->grids)
         return fail(BRUME_E_MEMORY, "no memory for the grids of volume '%s'", volume->name);
@@ -70,6 +69,64 @@ static brume_result retain_grids(struct volume *volume, const brume_volume *sour
     for (uint32_t i = 0; i < source->grid_count; ++i)
         volume->grids[i] = field_retain(source->grids[i]);
     return BRUME_OK;
+}
+
+static brume_result check_gaussian(const struct volume *volume, const brume_gaussian *gaussian,
+                                   uint32_t number)
+{
+    const float *center = gaussian->center, *color = gaussian->color;
+    if (!isfinite(center[0]) || !isfinite(center[1]) || !isfinite(center[2]))
+        return fail(BRUME_E_ARGUMENT, "Gaussian %u of volume '%s' has a NaN or infinite center",
+                    number, volume->name);
+    if (!(gaussian->scale > 0.0f && isfinite(gaussian->scale)))
+        return fail(BRUME_E_ARGUMENT,
+                    "Gaussian %u of volume '%s' has the scale %g; it must be finite and positive",
+                    number, volume->name, gaussian->scale);
+    if (!(gaussian->amplitude >= 0.0f && isfinite(gaussian->amplitude)))
+        return fail(BRUME_E_ARGUMENT,
+                    "Gaussian %u of volume '%s' has the amplitude %g; it must be finite and not "
+                    "negative",
+                    number, volume->name, gaussian->amplitude);
+    for (int c = 0; c < 3; ++c)
+        if (!(color[c] >= 0.0f && isfinite(color[c])))
+            return fail(BRUME_E_ARGUMENT,
+                        "Gaussian %u of volume '%s' has the color (%g, %g, %g); it must be finite "
+                        "and not negative",
+                        number, volume->name, color[0], color[1], color[2]);
+    return BRUME_OK;
+}
+
+static brume_result copy_gaussians(struct volume *volume, const brume_volume *source)
+{
+    if (source->gaussian_count == 0)
+        return fail(BRUME_E_ARGUMENT, "volume '%s' has no Gaussians", volume->name);
+    volume->gaussians = malloc(source->gaussian_count * sizeof *volume->gaussians);
+    if (!volume->gaussians)
+        return fail(BRUME_E_MEMORY, "no memory for the Gaussians of volume '%s'", volume->name);
+    for (uint32_t i = 0; i < source->gaussian_count; ++i) {
+        TRY(check_gaussian(volume, &source->gaussians[i], i));
+        if (source->gaussians[i].amplitude > 0.0f)
+            volume->gaussians[volume->gaussian_count++] = source->gaussians[i];
+    }
+    return BRUME_OK;
+}
+
+/* Grids, a mesh or Gaussians: exactly one of them. */
+static brume_result copy_content(struct volume *volume, const brume_volume *source)
+{
+    bool grids = false;
+    for (uint32_t i = 0; source->grids && i < source->grid_count; ++i)
+        grids = grids || source->grids[i];
+    const bool mesh = source->positions, gaussians = source->gaussians;
+    if (grids + mesh + gaussians == 0)
+        return fail(BRUME_E_ARGUMENT, "volume '%s' has neither a grid, a mesh nor Gaussians",
+                    volume->name);
+    if (grids + mesh + gaussians > 1)
+        return fail(BRUME_E_ARGUMENT, "volume '%s' has more than one of grids, mesh and Gaussians",
+                    volume->name);
+    return grids  ? retain_grids(volume, source)
+           : mesh ? copy_mesh(volume, source)
+                  : copy_gaussians(volume, source);
 }
 
 static void grow(struct volume *volume, const float lower[3], const float upper[3])
@@ -108,6 +165,19 @@ static brume_result find_bounds(struct volume *volume)
         mat4_bounds(from_array, lower, upper, world_lower, world_upper);
         grow(volume, world_lower, world_upper);
     }
+    for (uint32_t i = 0; i < volume->gaussian_count; ++i) {
+        double center[3];
+        float lower[3], upper[3];
+        const double reach = GAUSSIAN_REACH / gaussian_place(&volume->gaussians[i],
+                                                             volume->world_from_object, center);
+        for (int axis = 0; axis < 3; ++axis) {
+            lower[axis] = (float)(center[axis] - reach);
+            upper[axis] = (float)(center[axis] + reach);
+        }
+        grow(volume, lower, upper);
+    }
+    if (volume->gaussians && volume->gaussian_count == 0)
+        return BRUME_OK; /* reaches nowhere */
     for (int axis = 0; axis < 3; ++axis)
         if (!isfinite(volume->lower[axis]) || !isfinite(volume->upper[axis]))
             return fail(BRUME_E_TRANSFORM, "volume '%s' reaches further than numbers do",
@@ -135,11 +205,12 @@ brume_result volume_create(const brume_volume *source, struct volume **out)
     if (result == BRUME_OK)
         result = check_transform(volume);
     if (result == BRUME_OK)
-        result = source->positions ? copy_mesh(volume, source) : retain_grids(volume, source);
+        result = copy_content(volume, source);
     if (result == BRUME_OK)
         result = find_bounds(volume);
     if (result == BRUME_OK)
-        result = volume_program_init(&volume->program, &source->program, source->grid_count,
+        result = volume_program_init(&volume->program, &source->program,
+                                     volume->gaussians ? GAUSSIAN_GRIDS : source->grid_count,
                                      volume->name);
     if (result != BRUME_OK) {
         volume_release(volume);
@@ -165,6 +236,7 @@ void volume_release(struct volume *volume)
     free(volume->grids);
     free(volume->positions);
     free(volume->triangles);
+    free(volume->gaussians);
     volume_program_finish(&volume->program);
     free(volume);
 }

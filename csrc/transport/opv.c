@@ -4,32 +4,10 @@
  * equation 4) are marched exactly for now; the world's light goes into a lattice of its own. */
 #include "base/hash.h"
 #include "base/result.h"
+#include "transport/depths.h"
 #include "transport/method.h"
 
 #include <stdlib.h>
-
-/* Samples whose transmittances are averaged for a light with extent; at most 8 (opv_tau). */
-#define EXTENDED_SAMPLES 4
-
-static uint32_t depth_samples(const struct gpu_light *light, float cell)
-{
-    int extended;
-    switch (light->info.x) {
-    case LIGHT_SUN:
-        extended = light->axis.w > 0.02f;
-        break;
-    case LIGHT_POINT:
-    case LIGHT_SPOT:
-        extended = light->position.w > cell;
-        break;
-    default:
-        extended = light->radiance.w > cell * cell;
-        break;
-    }
-    if (!extended)
-        return 1;
-    return light->samples.y < EXTENDED_SAMPLES ? light->samples.y : EXTENDED_SAMPLES;
-}
 
 /* Runs a lattice program in slabs, so that a cancel need not wait for the whole lattice. */
 static brume_result run_slabs(const struct transport_input *input, const struct program *program,
@@ -59,16 +37,16 @@ static brume_result run_slabs(const struct transport_input *input, const struct 
     return result;
 }
 
-/* All that opv_tau reads of a light, and where it writes. 0: the light has no tile. */
+/* All that a light's depths are made from, and where they are. 0: the light has no tile. */
 static uint64_t tau_signature(const struct transport_input *input, const struct gpu_light *light)
 {
     if (!light->info.w)
         return 0;
     const struct gpu_frame *frame = input->frame;
     const vec4 point = {light->position.x, light->position.y, light->position.z, 0.0f};
-    const uint32_t count = depth_samples(light, frame->lattice_lower.w);
-    const uint64_t parts[] = {input->medium_revision, light->info.x, light->info.y, light->info.z,
-                              count};
+    const uint32_t count = depths_samples(light, frame->lattice_lower.w);
+    const uint64_t parts[] = {input->medium_revision, light->info.x, light->info.y,
+                              light->info.z,          count,         input->settings->depths};
     uint64_t hash = hash_bytes(HASH_START, parts, sizeof parts);
     hash = hash_bytes(hash, &frame->lattice_lower, sizeof frame->lattice_lower);
     hash = hash_bytes(hash, &frame->lattice_dims, sizeof frame->lattice_dims);
@@ -102,29 +80,37 @@ static brume_result compare_tiles(struct transport *transport, const struct tran
     return BRUME_OK;
 }
 
-static brume_result run_tau(struct transport *transport, const struct transport_input *input)
+/* Half floats that nobody wrote may be NaN, which no weight of 0 makes harmless. */
+static brume_result ensure_tau(struct transport *transport, const struct transport_input *input)
 {
-    const struct program *program;
-    uint64_t *wanted = NULL;
-    TRY(program_compute(&input->gpu->programs, "opv_tau", &program));
-    TRY(compare_tiles(transport, input, &wanted));
+    const GLuint before = transport->tau.id;
     TRY(texture_ensure(&input->gpu->memory, &transport->tau, FOR_TRANSPORT, GL_TEXTURE_3D,
                        GL_RGBA16F, input->tau_size[0], input->tau_size[1], input->tau_size[2], 1,
-                       "optical depth"));
-    glBindImageTexture(SLOT_OUTPUT, transport->tau.id, 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA16F);
-    for (uint32_t i = 0; i < input->light_count; ++i) {
-        const struct gpu_light *light = &input->lights[i];
-        if (transport->tau_signatures[i] == wanted[i])
-            continue;
-        const struct gpu_lattice_pass pass = {
-            .offset = {(int)i, (int)depth_samples(light, input->frame->lattice_lower.w),
-                       (int)light->info.y, (int)light->info.z}};
-        TRY(run_slabs(input, program, pass, &input->frame->lattice_dims,
-                      0.1f + 0.1f * (float)(i + 1) / (float)input->light_count));
-        transport->tau_signatures[i] = wanted[i];
-        ++input->stats->lights_propagated;
-    }
+                       "optical depths"));
+    if (transport->tau.id != before)
+        glClearTexImage(transport->tau.id, 0, GL_RGBA, GL_FLOAT, NULL);
     return BRUME_OK;
+}
+
+static brume_result run_tau(struct transport *transport, const struct transport_input *input)
+{
+    uint64_t *wanted = NULL;
+    uint32_t count = 0;
+    TRY(compare_tiles(transport, input, &wanted));
+    TRY(ensure_tau(transport, input));
+    uint32_t *changed = malloc((input->light_count + 1) * sizeof *changed);
+    if (!changed)
+        return fail(BRUME_E_MEMORY, "no memory for %u lights", input->light_count);
+    for (uint32_t i = 0; i < input->light_count; ++i)
+        if (transport->tau_signatures[i] != wanted[i])
+            changed[count++] = i;
+    const brume_result result = count ? depths_run(transport, input, changed, count) : BRUME_OK;
+    for (uint32_t i = 0; i < count && result == BRUME_OK; ++i)
+        transport->tau_signatures[changed[i]] = wanted[changed[i]];
+    if (result == BRUME_OK)
+        input->stats->lights_propagated += count;
+    free(changed);
+    return result;
 }
 
 /* All that opv_sky reads. */

@@ -20,6 +20,7 @@ typedef struct mat4 { float m[16]; } mat4;
 /* Group sizes */
 #define GROUP_PIXELS 8   /* 8 x 8 x 1: a view pass */
 #define GROUP_CELLS 4    /* 4 x 4 x 4: a lattice pass */
+#define GROUP_BRICK 8    /* 8 x 8 x 8: what propagation computes as one */
 
 /* Uniform blocks */
 #define SLOT_FRAME 0
@@ -32,6 +33,8 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_MATERIALS 3
 #define SLOT_INSTANCES 4
 #define SLOT_ACCUMULATION 5
+#define SLOT_DEPTH_SOURCES 6
+#define SLOT_DEPTH_BRICKS 7
 
 /* Textures */
 #define SLOT_MEDIUM_SCATTER 0
@@ -52,6 +55,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_MATERIAL_BASE 15
 #define SLOT_MATERIAL_ROUGHNESS 16
 #define SLOT_GBUFFER_TINT 17
+#define SLOT_DEPTH_BEFORE 18
 
 /* Images written by compute passes */
 #define SLOT_OUTPUT 0
@@ -133,8 +137,16 @@ struct gpu_draw {
 
 /* The lattice stages' block. */
 struct gpu_lattice_pass {
-    ivec4 offset;        /* x: first light or world sample; y: count; z, w: tile origin (y, z) */
-    ivec4 slab;          /* z: first node layer of this dispatch */
+    ivec4 offset;        /* what a stage's shader says */
+    ivec4 slab;          /* z, w: first node layer of this dispatch, and one after its last */
+};
+
+/* A point of a lamp, or a direction towards one, that optical depths are found to. */
+struct gpu_depth_source {
+    vec4 point;          /* w: 1 for the unit vector towards a sun */
+    ivec4 node;          /* where the light comes from: first node of its cell, or beyond the lattice's
+                            end; the paper's gather: the nearest node */
+    ivec4 tile;          /* y, z: where its lattice begins in the texture */
 };
 
 /* Passes as brume_pass of brume.h. */

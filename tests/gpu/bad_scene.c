@@ -373,6 +373,35 @@ static void dense_volumes(void **state)
     assert_unharmed();
 }
 
+/* Bad ones are refused; those without amplitude show nothing, beside another medium or alone. */
+static void gaussians(void **state)
+{
+    (void)state;
+    brume_instruction instructions[4];
+    brume_gaussian one = {.scale = -1, .color = {1, 1, 1}, .amplitude = 1};
+    brume_volume volume = {.name = "Sparks", .gaussians = &one, .gaussian_count = 1};
+    constant_program(&fog, instructions, &volume.program);
+    memcpy(volume.world_from_object, identity, sizeof identity);
+    assert_refused(brume_scene_set_volume(scene, 1, &volume), BRUME_E_ARGUMENT, "Sparks");
+    one.scale = 1;
+    volume.gaussian_count = 0;
+    assert_refused(brume_scene_set_volume(scene, 1, &volume), BRUME_E_ARGUMENT, "Sparks");
+    assert_unharmed();
+
+    volume.gaussian_count = 1;
+    one.amplitude = 0;
+    assert_ok(brume_scene_set_volume(scene, 2, &volume));
+    assert_unharmed();
+    assert_ok(brume_scene_set_volume(scene, 1, &volume));
+    value_now();
+    one.amplitude = 3e38f;
+    assert_ok(brume_scene_set_volume(scene, 1, &volume));
+    value_now();
+    assert_ok(brume_scene_remove(scene, BRUME_KIND_VOLUME, 2));
+    add_fog_cube(scene, 1, origin, 0.5f, &fog);
+    assert_unharmed();
+}
+
 static void keys_and_kinds(void **state)
 {
     (void)state;
@@ -492,8 +521,9 @@ int main(void)
         in_scene(images_with_bad_pixels), in_scene(lights),
         in_scene(odd_lights),      in_scene(worlds),
         in_scene(volumes),         in_scene(dense_volumes),
-        in_scene(keys_and_kinds),  in_scene(settings_and_views),
-        in_scene(empty_scene),     in_scene(twenty_thousand_instances),
+        in_scene(gaussians),       in_scene(keys_and_kinds),
+        in_scene(settings_and_views), in_scene(empty_scene),
+        in_scene(twenty_thousand_instances),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

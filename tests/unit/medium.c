@@ -789,11 +789,11 @@ static void bad_volumes_are_refused_by_name(void **state)
 
     bad = good;
     bad.positions = NULL;
-    refused(&bad, BRUME_E_ARGUMENT, "neither a grid nor a mesh");
+    refused(&bad, BRUME_E_ARGUMENT, "neither a grid, a mesh nor Gaussians");
     brume_grid *grids[2] = {NULL, NULL};
     bad.grids = grids;
     bad.grid_count = 2;
-    refused(&bad, BRUME_E_ARGUMENT, "neither a grid nor a mesh");
+    refused(&bad, BRUME_E_ARGUMENT, "neither a grid, a mesh nor Gaussians");
     float flat[16];
     mat4_identity(flat);
     flat[5] = 0.0f;

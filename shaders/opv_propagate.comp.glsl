@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Optical depths carried outwards from a source, brick by brick. A node marches no further than to
+// the first point whose neighbours all lie in bricks nearer to the light, and takes the rest from
+// there. Bricks are as far from the light as the sum of their distances along the axes; all that are
+// equally far are one dispatch, so each node is computed once.
+#version 450 core
+#include "lib/depth.glsl"
+
+layout(local_size_x = GROUP_BRICK, local_size_y = GROUP_BRICK, local_size_z = GROUP_BRICK) in;
+
+layout(std140, binding = SLOT_STAGE) uniform stage_block
+{
+    gpu_lattice_pass stage; // offset.x: first brick
+};
+
+layout(std430, binding = SLOT_DEPTH_BRICKS) readonly buffer bricks_block
+{
+    ivec4 bricks[]; // first node; w: source
+};
+
+layout(binding = SLOT_DEPTH_BEFORE) uniform sampler3D depth_before; // the image, as it was
+layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D depth_image;
+
+// How far along the way the nodes around a point are all nearer to the light by a brick.
+float way_to_nearer_bricks(ivec3 node, ivec3 first, ivec3 origin, vec3 towards)
+{
+    vec3 speed = abs(towards) / frame.lattice_lower.w; // nodes a metre
+    float nearest = 1e30;
+    for (int i = 0; i < 3; ++i) {
+        // Nodes from the light's cell to the brick, and to this node.
+        bool above = first[i] > origin[i];
+        int start = above ? first[i] - origin[i] - 1 : origin[i] - first[i] - (GROUP_BRICK - 1);
+        int steps = above ? node[i] - origin[i] - 1 : origin[i] - node[i];
+        if (start > 0)
+            nearest = min(nearest, float(steps - start + 1) / max(speed[i], 1e-20));
+    }
+    return nearest;
+}
+
+// As medium_tau, over a stretch too short to gain from what empty bricks save.
+vec3 short_tau(vec3 origin, vec3 direction, float from, float to)
+{
+    if (from >= to)
+        return vec3(0.0);
+    int count = max(int(ceil((to - from) / frame.medium_lower.w)), 1);
+    float dt = (to - from) / float(count);
+    vec3 scale = 1.0 / (frame.medium_lower.w * vec3(textureSize(medium_extinct, 0)));
+    vec3 at = (origin + direction * (from + 0.5 * dt) - frame.medium_lower.xyz) * scale;
+    vec3 along = direction * dt * scale;
+    vec3 sum = vec3(0.0);
+    for (int k = 0; k < count; ++k, at += along)
+        sum += textureLod(medium_extinct, at, 0.0).rgb;
+    return sum * dt;
+}
+
+void main()
+{
+    ivec4 brick = bricks[stage.offset.x + int(gl_WorkGroupID.x)];
+    ivec3 node = brick.xyz + ivec3(gl_LocalInvocationID);
+    if (any(lessThan(node, ivec3(0))) || any(greaterThanEqual(node, frame.lattice_dims.xyz)))
+        return;
+    gpu_depth_source source = sources[brick.w];
+    vec3 p = node_position(node);
+    light_way way = way_to(source, p);
+    float end = min(way_to_nearer_bricks(node, brick.xyz, source.node.xyz, way.towards), way.to);
+    vec3 tau = short_tau(p, way.towards, way.from, end);
+    if (end < way.to) {
+        vec3 at = clamp((p + way.towards * end - frame.lattice_lower.xyz) / frame.lattice_lower.w,
+                        vec3(0.0), vec3(frame.lattice_dims.xyz - 1));
+        at = (at + vec3(source.tile.xyz) + 0.5) / vec3(textureSize(depth_before, 0));
+        tau += textureLod(depth_before, at, 0.0).rgb * (way.to - max(end, way.from));
+    }
+    imageStore(depth_image, node + source.tile.xyz, depth_texel(tau, way.to - way.from, p));
+}

@@ -103,11 +103,9 @@ void mat4_bounds(const float m[16], const float lower[3], const float upper[3], 
     }
 }
 
-void mat4_look(const float eye[3], const float direction[3], float out[16])
+void mat4_look(const float eye[3], const float direction[3], const float up[3], float out[16])
 {
-    float tangent[3], bitangent[3];
-    frame_around(direction, tangent, bitangent);
-    store(glm::lookAt(load3(eye), load3(eye) + load3(direction), load3(bitangent)), out);
+    store(glm::lookAt(load3(eye), load3(eye) + load3(direction), load3(up)), out);
 }
 
 void mat4_orthographic(float left, float right, float bottom, float top, float near_, float far_,

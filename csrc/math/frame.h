@@ -21,8 +21,8 @@ void mat4_vector(const float m[16], const float v[3], float out[3]);
 /* world-axis box of a transformed box */
 void mat4_bounds(const float m[16], const float lower[3], const float upper[3], float out_lower[3],
                  float out_upper[3]);
-/* view_from_world of an eye that looks along direction. */
-void mat4_look(const float eye[3], const float direction[3], float out[16]);
+/* view_from_world of an eye that looks along direction, with up (not along direction) upwards. */
+void mat4_look(const float eye[3], const float direction[3], const float up[3], float out[16]);
 void mat4_orthographic(float left, float right, float bottom, float top, float near_, float far_,
                        float out[16]);
 void mat4_perspective(float fov_y, float aspect, float near_, float far_, float out[16]);

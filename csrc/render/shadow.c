@@ -37,11 +37,13 @@ static void orthographic_view(const struct geometry *geometry, const float lower
                               struct gpu_shadow_view *out)
 {
     float center[3], view[16], projection[16], low[3], high[3], all_low[3], all_high[3];
+    float right[3], up[3];
     const float radius = fmaxf(radius_of(geometry, center), 1e-4f);
     const float direction[3] = {-towards->x, -towards->y, -towards->z};
     const float eye[3] = {center[0] - direction[0] * radius, center[1] - direction[1] * radius,
                           center[2] - direction[2] * radius};
-    mat4_look(eye, direction, view);
+    frame_around(direction, right, up);
+    mat4_look(eye, direction, up, view);
     mat4_bounds(view, lower, upper, low, high);
     mat4_bounds(view, geometry->lower, geometry->upper, all_low, all_high);
     /* Square texels, and a texel of room for the filter at the rim. */
@@ -83,11 +85,11 @@ static void distant_views(const struct geometry *geometry, uint32_t faces, const
     orthographic_view(geometry, geometry->lower, geometry->upper, towards, side, out);
 }
 
-static void perspective_view(const float eye[3], const float direction[3], float tangent, int side,
-                             float near_, struct gpu_shadow_view *out)
+static void perspective_view(const float eye[3], const float direction[3], const float up[3],
+                             float tangent, int side, float near_, struct gpu_shadow_view *out)
 {
     float view[16];
-    mat4_look(eye, direction, view);
+    mat4_look(eye, direction, up, view);
     tangent *= 1.0f + 4.0f / (float)side; /* room for the filter at the rim */
     /* Reversed depth without a far plane: near / distance. */
     const float projection[16] = {1.0f / tangent, 0, 0, 0, 0, 1.0f / tangent, 0, 0,
@@ -107,7 +109,7 @@ static void lamp_views(const brume_light *light, const struct gpu_light *gpu,
     light_frame(gpu, u, v, forward);
     const uint32_t faces = light_faces(light);
     if (faces == 1) {
-        perspective_view(eye, forward, tanf(0.5f * light->spot_angle), side, near_, out);
+        perspective_view(eye, forward, v, tanf(0.5f * light->spot_angle), side, near_, out);
         return;
     }
     for (uint32_t face = 0; face < faces; ++face) {
@@ -116,7 +118,9 @@ static void lamp_views(const brume_light *light, const struct gpu_light *gpu,
             const float axes[6] = {forward[i], u[i], -u[i], v[i], -v[i], -forward[i]};
             direction[i] = axes[face];
         }
-        perspective_view(eye, direction, 1.0f, side, near_, &out[face]);
+        /* Upright in the lamp's frame, or the faces would not meet at the cube's edges. */
+        const float *up = face == 3 || face == 4 ? forward : v;
+        perspective_view(eye, direction, up, 1.0f, side, near_, &out[face]);
     }
 }
 

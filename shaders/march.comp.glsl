@@ -41,6 +41,20 @@ float mean_inverse_square(float t0, float t1, float h)
     return angle / (h * (t1 - t0));
 }
 
+// The distance from the ray that mean_inverse_square wants, and in `along` the point's place on the
+// ray. The light of a point or spot is that of a disk that faces whom it lights, as in Cycles:
+// 2 (1 - d / sqrt(d^2 + r^2)) / r^2 instead of 1/d^2, which is 1 / (d^2 + 0.7 r^2) within 6 % from
+// d = r / 2 on. Samples strewn over the lamp would each have a bright core of their own.
+float nearest_approach(gpu_light light, gpu_light_sample s, view_ray ray, out float along)
+{
+    bool disk = light.info.x == uint(LIGHT_POINT) || light.info.x == uint(LIGHT_SPOT);
+    vec3 v = (disk ? light.position.xyz : s.position.xyz) - ray.origin;
+    along = dot(v, ray.direction);
+    vec3 off = v - along * ray.direction;
+    float soft = disk ? 0.7 * light.position.w * light.position.w : 0.0;
+    return sqrt(max(dot(off, off) + soft, 1e-8));
+}
+
 // The medium at one step of the ray: lattice and fog together.
 struct medium_step
 {
@@ -111,7 +125,8 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
     uint turn = (uint(frame.size.z) + pixel_hash(pixel, number)) % light.samples.y;
     gpu_light_sample light_sample = light_samples[light.samples.x + turn];
     bool sun = light.info.x == uint(LIGHT_SUN);
-    float along = dot(light_sample.position.xyz - ray.origin, ray.direction);
+    float along;
+    float h = nearest_approach(light, light_sample, ray, along);
     vec3 sum = vec3(0.0);
     for (int k = first; k < end; ++k) {
         float within = step_jitter(jitter, k);
@@ -132,10 +147,8 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
         if (light_here != vec3(0.0))
             light_here *= light_shadow_medium(light, light_sample, p, distance);
         if (light_here != vec3(0.0)) {
-            if (!sun) {
-                float h = sqrt(max(square - (along - t) * (along - t), 1e-8));
+            if (!sun)
                 light_here *= mean_inverse_square(t0 - along, t0 + dt - along, h);
-            }
             sum += transmittance * step_weight(m.sigma_t, through, dt) * m.sigma_s * light_here *
                    (phase_hg(dot(towards, ray.direction), m.g) *
                     light_transmittance(light, p, towards, distance));

@@ -114,6 +114,44 @@ static void area_on_plate(void **state)
     }
 }
 
+/* A lamp in a shut box lights nothing outside, whichever way it looks: its maps leave no gap. */
+static void shut_in(void **state)
+{
+    (void)state;
+    static const float place[3] = {0, 0, 0.5f};
+    static const float directions[][3] = {{0, 0, -1}, {0.3f, -0.5f, -0.8f}, {1, 1, 1}};
+    static const uint32_t types[] = {BRUME_LIGHT_POINT, BRUME_LIGHT_RECTANGLE};
+    float positions[24];
+    uint32_t triangles[36];
+    cube_mesh(place, 0.2f, positions, triangles);
+    const brume_mesh box = {.name = "box", .positions = positions, .triangles = triangles,
+                            .vertex_count = 8, .triangle_count = 12};
+    const brume_instances instances = {.world_from_object = identity, .mesh = 2, .count = 1,
+                                       .visibility = BRUME_VISIBLE_SHADOW};
+    for (int i = 0; i < 6; ++i) {
+        brume_scene *scene;
+        assert_ok(brume_scene_create(device, &scene));
+        add_plate(scene, 1, origin, down, 4.0f);
+        assert_ok(brume_scene_set_mesh(scene, 2, &box));
+        assert_ok(brume_scene_set_instances(scene, 2, &instances));
+        brume_light lamp = point_lamp(place, 10.0f);
+        lamp.type = types[i % 2];
+        lamp.size[0] = lamp.size[1] = 0.1f;
+        placed(place, directions[i / 2], lamp.world_from_light);
+        assert_ok(brume_scene_set_light(scene, 1, &lamp));
+        const brume_view view = orthographic_view(origin, down, 3.9f, 2.0f, 64);
+        brume_job *job = render(scene, &settings, &view);
+        float *pixels = read_pass(job, &view, BRUME_PASS_COMBINED);
+        for (int pixel = 0; pixel < 64 * 64; ++pixel)
+            if (pixels[4 * pixel] != 0.0f)
+                fail_msg("case %d: %g at pixel (%d, %d)", i, pixels[4 * pixel], pixel % 64,
+                         pixel / 64);
+        free(pixels);
+        brume_job_release(job);
+        brume_scene_destroy(scene);
+    }
+}
+
 /* Under an even world an open plate has the world's radiance times its albedo. */
 static void world_on_plate(void **state)
 {
@@ -255,8 +293,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sun_on_plate),   cmocka_unit_test(point_on_plate),
         cmocka_unit_test(spot_on_plate),  cmocka_unit_test(area_on_plate),
-        cmocka_unit_test(world_on_plate), cmocka_unit_test(airlight_of_lamps),
-        cmocka_unit_test(volume_factor),
+        cmocka_unit_test(world_on_plate), cmocka_unit_test(shut_in),
+        cmocka_unit_test(airlight_of_lamps), cmocka_unit_test(volume_factor),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

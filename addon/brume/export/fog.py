@@ -173,7 +173,7 @@ class _Reader:
                 f'Object "{self.ob.name}": {unusable.sum()} of its {count} points have no finite '
                 f"position, size and colour, or a negative size, and are left out.")
         # A radius of 0 or almost so, or no strength, is how fog begins and ends.
-        kept = ~unusable & np.isfinite(found[:, 3]) & (found[:, 3] > 0) & (found[:, 7] > 0)
+        kept = ~unusable & np.isfinite(found).all(1) & (found[:, 3] > 0) & (found[:, 7] > 0)
         return found[kept] if kept.any() else None
 
 

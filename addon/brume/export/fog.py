@@ -35,7 +35,7 @@ def numbers(ob, own, shown):
     is the object's, not what modifiers made beside it; shown: whether it is itself seen."""
     def applies(source):
         if source.source == 'POINTS':
-            return shown and (ob.type in {'MESH', 'POINTCLOUD'} or ob.type == 'EMPTY')
+            return shown and ob.type in {'MESH', 'POINTCLOUD', 'EMPTY'}
         return own and (shown or source.source == 'PARTICLES')
     return [number for number, source in enumerate(ob.brume.fog_sources)
             if source.enabled and applies(source)]

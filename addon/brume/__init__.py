@@ -11,12 +11,13 @@ bl_info = {
     "location": "Render Properties > Render Engine",
 }
 
-from . import engine, panels, properties, session, viewport  # noqa: E402
+from . import engine, fog, panels, properties, session, viewport  # noqa: E402
 from .export import changes  # noqa: E402
 
 
 def register():
     properties.register()
+    fog.register()
     changes.register()
     engine.register()
     panels.register()
@@ -26,6 +27,7 @@ def unregister():
     panels.unregister()
     engine.unregister()
     changes.unregister()
+    fog.unregister()
     properties.unregister()
     viewport.close()
     session.close()

@@ -64,14 +64,14 @@ def corner_uvs(layer, count):
     return uvs.reshape(-1, 2)
 
 
-def positions(mesh):
-    """Positions of all vertices, (vertices, 3)."""
-    values = np.empty(len(mesh.vertices) * 3, np.float32)
-    attribute = mesh.attributes.get("position")
+def positions(data, points):
+    """Positions of all vertices of a mesh or points of a point cloud, (points, 3)."""
+    values = np.empty(len(points) * 3, np.float32)
+    attribute = data.attributes.get("position")
     if attribute is not None:
         attribute.data.foreach_get("vector", values)
     else:
-        mesh.vertices.foreach_get("co", values)
+        points.foreach_get("co", values)
     return values.reshape(-1, 3)
 
 

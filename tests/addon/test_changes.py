@@ -380,6 +380,34 @@ class Edits:
         data.materials.append(self.material())
         return self.link(bpy.data.objects.new(data.name, data))
 
+    def do_add_empty(self):
+        return self.link(bpy.data.objects.new(self.name("Empty"), None))
+
+    def do_add_metaball(self):
+        data = bpy.data.metaballs.new(self.name("Ball"))
+        data.elements.new().radius = self.rng.uniform(1, 2)
+        return self.link(bpy.data.objects.new(self.rng.choice(["Ball", data.name]), data))
+
+    def do_fog(self):
+        ob = self.any('MESH', 'EMPTY', 'META')
+        bpy.context.view_layer.objects.active = ob
+        if len(ob.brume.fog_sources) > 2:
+            bpy.ops.brume.fog_remove()
+        else:
+            bpy.ops.brume.fog_add()
+        return f"{ob.name} {len(ob.brume.fog_sources)}"
+
+    def do_fog_setting(self):
+        ob = self.rng.choice([ob for ob in bpy.context.view_layer.objects if ob.brume.fog_sources])
+        source = self.rng.choice(list(ob.brume.fog_sources))
+        kind = self.rng.choice(["source", "enabled", "radius", "material", "factor_attribute"])
+        setattr(source, kind, {
+            "source": self.rng.choice(['OBJECT', 'POINTS', 'PARTICLES']),
+            "enabled": not source.enabled, "radius": self.rng.uniform(0, 2),
+            "material": self.rng.choice([None, self.material()]),
+            "factor_attribute": self.rng.choice(["", "crease"])}[kind])
+        return f"{ob.name} {kind}"
+
     def do_delete(self):
         ob = self.any()
         name = ob.name

@@ -6,6 +6,8 @@ Meshes, materials and the like are read again only if they changed: target.part 
 """
 
 import itertools
+import re
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +15,7 @@ import numpy as np
 from .. import native, properties
 from ..compat import identity
 from ..native import BrumeError
-from . import fluid, light, material, mesh, nodes, volume, world
+from . import fluid, fog, light, material, mesh, nodes, volume, world
 from .changes import GEOMETRY, SHADING
 from .target import key_of, key_of_datablock
 
@@ -45,8 +47,8 @@ _serial = itertools.count()
 class _Thing:
     """What all instances of one object with one shape have in common."""
 
-    def __init__(self, each=None, mesh=None, visibility=0):
-        self.each = each      # called with every instance, its object and matrix, unless None
+    def __init__(self, *each, mesh=None, visibility=0):
+        self.each = each      # are called with every instance, its object and matrix
         self.group = mesh, visibility
         self.indices = []     # of the instances
 
@@ -56,6 +58,11 @@ def _path(instance):
     if not instance.is_instance:
         return ()
     return (identity(instance.parent), *instance.persistent_id)
+
+
+def _family(ob):
+    """Metaballs whose names differ in the number at the end are one surface."""
+    return re.sub(r"\.\d+$", "", ob.original.name)
 
 
 def _matrices(instances):
@@ -75,29 +82,36 @@ class _Export:
         self.drawn = set()   # those on a mesh
         self.shared = {}     # by mesh: its evaluated one
         self.numbers = {}    # how many shapes came up of one object and mesh
+        self.families = None  # of metaballs that are fog, once they are asked for
 
     def run(self):
         instances = self.depsgraph.object_instances
         matrices = _matrices(instances)
         for index, instance in enumerate(instances):
-            if not instance.show_self:
+            shown = instance.show_self
+            if not shown and not instance.show_particles:
                 continue
             ob = instance.object
             # Only the evaluated object knows of local views; an instance has its instancer's.
             if self.space and not ob.visible_in_viewport_get(self.space):
                 continue
-            key = ob.original, ob.data
-            try:
-                thing = self.things.get(key)
-                if thing is None:
-                    thing = self.things[key] = _Thing()
-                    self.things[key] = thing = self.thing(instance, ob)
-                thing.indices.append(index)
-                if thing.each is not None:
-                    thing.each(instance, ob, matrices[index])
-            except BrumeError as error:
-                self.target.reports.warn(error.id, f'Object "{ob.name}": {error.sentence}')
+            key = ob.original, ob.data, shown
+            thing = self.things.get(key)
+            if thing is None:
+                thing = self.things[key] = self.thing(instance, ob, shown)
+            thing.indices.append(index)
+            for each in thing.each:
+                with self.reporting(ob):
+                    each(instance, ob, matrices[index])
         self.put_instances(matrices)
+
+    @contextmanager
+    def reporting(self, ob):
+        """What fails of an object does not cost the rest."""
+        try:
+            yield
+        except BrumeError as error:
+            self.target.reports.warn(error.id, f'Object "{ob.name}": {error.sentence}')
 
     def put_instances(self, matrices):
         groups = {}
@@ -109,14 +123,27 @@ class _Export:
                 self.target.put("instances", key_of(key, visibility), block.tobytes(), mesh=key,
                                 world_from_object=block, visibility=visibility)
 
-    def thing(self, instance, ob):
+    def thing(self, instance, ob, shown):
+        thing = _Thing()
+        if shown:
+            with self.reporting(ob):
+                thing = self.itself(instance, ob)
+        numbers = fog.numbers(ob, self.is_own(ob), shown)
+        if numbers:
+            def each(instance, ob, matrix):
+                self.fog(instance, ob, matrix, numbers)
+            thing.each += (each,)
+        return thing
+
+    def itself(self, instance, ob):
         if ob.type == 'LIGHT':
             return _Thing(self.light)
         if ob.type == 'VOLUME':
             return _Thing(self.volume)
         if ob.type == 'MESH':
             return self.surface(instance, ob)
-        if ob.type not in _UNSEEN:
+        seen_as_fog = ob.type == 'POINTCLOUD' and fog.is_fog(ob, 'POINTS')
+        if ob.type not in _UNSEEN and not seen_as_fog:
             self.target.reports.unsupported(f'Object "{ob.name}"',
                                             f"objects of type {ob.type} are not shown.")
         return _Thing()
@@ -129,9 +156,22 @@ class _Export:
             self.target, ob, matrix, key_of_datablock(ob, "volume", *_path(instance)),
             self.makers(instance, ob), self.override)
 
+    def fog(self, instance, ob, matrix, numbers):
+        for number in numbers:
+            key = key_of_datablock(ob, "fog", number, *_path(instance))
+            with self.reporting(ob):
+                fog.export(self.target, self.depsgraph, ob, number, matrix, instance.is_instance,
+                           key, self.makers(instance, ob), self.override)
+
+    def is_own(self, ob):
+        """Whether the data is the object's, not what modifiers or curves made beside it."""
+        return ob.original.evaluated_get(self.depsgraph).data == ob.data
+
     def makers(self, instance, ob):
         """Identities of what an object's data is made of."""
-        found = {identity(ob), identity(ob.data)}
+        found = {identity(ob)}
+        if ob.data:
+            found.add(identity(ob.data))
         if instance.is_instance:
             found.add(identity(instance.parent))
         return found
@@ -139,8 +179,9 @@ class _Export:
     # -- surfaces
 
     def surface(self, instance, ob):
-        # Whether the data is the object's, not what modifiers or curves made beside it.
-        own = ob.original.evaluated_get(self.depsgraph).data == ob.data
+        if ob.original.type == 'META' and _family(ob) in self.fog_families():
+            return _Thing()
+        own = self.is_own(ob)
         slots = [self.slot(m) for m in self.materials(ob, own)]
         shape, reads = self.shape(instance, ob, own, slots)
         if shape.mesh is not None:
@@ -148,13 +189,21 @@ class _Export:
                 if slot not in self.drawn:
                     self.drawn.add(slot)
                     material.export(self.target, slot.material)
-        each = None
+        thing = _Thing(mesh=shape.mesh, visibility=self.visibility(ob))
         if shape.medium is not None:
             medium = slots[shape.medium]
 
             def each(instance, ob, matrix):
                 self.medium(instance, ob, matrix, shape, medium, reads)
-        return _Thing(each, shape.mesh, self.visibility(ob))
+            thing.each = (each,)
+        return thing
+
+    def fog_families(self):
+        """Names of the families of metaballs that are fog instead of a surface."""
+        if self.families is None:
+            self.families = {_family(ob) for ob in self.depsgraph.objects
+                             if ob.type == 'META' and fog.is_fog(ob, 'OBJECT')}
+        return self.families
 
     def medium(self, instance, ob, matrix, shape, medium, reads):
         key = key_of_datablock(ob, "medium", *_path(instance))

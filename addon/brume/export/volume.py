@@ -29,22 +29,22 @@ def density_scale(matrix):
     return 1.0 / length
 
 
-def program_for(target, material, available):
+def program_for(target, material, available, numbered=()):
     """The compiled program of a material for a medium with these grids; None if the material has
-    no volume shader."""
+    no volume shader. numbered: the grids whose numbers are given."""
     available = frozenset(available)
-    name = "program", material and identity(material), available
+    name = "program", material and identity(material), available, numbered
     return target.part(name, None, nodes.identities(material) if material else (),
-                       lambda: _compile(target, material, available))
+                       lambda: _compile(target, material, available, numbered))
 
 
-def _compile(target, material, available):
+def _compile(target, material, available, numbered):
     if material is None:
         return default_program(available)
     tree = materials.volume_tree(material)
     owner = f'Material "{material.name}"'
     return tree and compile_volume(
-        tree, available, lambda sentence: target.reports.unsupported(owner, sentence))
+        tree, available, lambda sentence: target.reports.unsupported(owner, sentence), numbered)
 
 
 # ------------------------------------------------------------------------------------------------

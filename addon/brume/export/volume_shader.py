@@ -48,13 +48,18 @@ class Medium:
     emission: object
 
 
-class VolumeBuilder(Builder):
-    """available: names of the medium's grids; None where every name is taken on trust."""
+# What a program for Gaussians reads: the library gives it these two under these numbers.
+FOG_GRIDS = ("density", "color")
 
-    def __init__(self, warn, available):
+
+class VolumeBuilder(Builder):
+    """available: names of the medium's grids; None where every name is taken on trust. numbered:
+    those whose numbers are given; the others get theirs as they are asked for."""
+
+    def __init__(self, warn, available, numbered=()):
         super().__init__(warn)
         self.available = available
-        self.grids = []
+        self.grids = list(numbered)
         self.unknown = []
         self.unused = []
         self.handlers["ShaderNodeAttribute"] = type(self)._attribute
@@ -299,13 +304,14 @@ def _program(builder, medium):
                    constants=constants)
 
 
-def compile_volume(tree, available, warn):
+def compile_volume(tree, available, warn, numbered=()):
     """The program of a node tree's Volume output, or None if nothing is linked there.
-    available: names of the medium's grids, empty for a mesh or a world."""
+    available: names of the medium's grids, empty for a mesh or a world; numbered: as
+    VolumeBuilder."""
     place = nodes.output_place(tree, "Volume")
     if place is None or nodes.follow(place).node is None:
         return None
-    builder = VolumeBuilder(warn, available)
+    builder = VolumeBuilder(warn, available, numbered)
     return _program(builder, builder.closure(place))
 
 
@@ -317,3 +323,13 @@ def default_program(available):
     # Absorption colour black: sigma_a = density * (1 - 0.5).
     return _program(builder, Medium([(half, builder.constant(0.0))], half,
                                     builder.constant(0.0)))
+
+
+def plain_program(g):
+    """That of Gaussians without a material: their colour is the share of light that is scattered,
+    the rest is absorbed."""
+    builder = VolumeBuilder(lambda sentence: None, FOG_GRIDS, FOG_GRIDS)
+    density, color = map(builder.grid, FOG_GRIDS)
+    return _program(builder, Medium(
+        [(builder.op("MULTIPLY", density, color), builder.constant(g))],
+        builder.op("MULTIPLY", density, builder.clear(color)), builder.constant(0.0)))

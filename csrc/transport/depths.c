@@ -47,7 +47,7 @@ static uint64_t texture_bytes(int width, int height, int depth)
 }
 
 uint64_t depths_working_bytes(const brume_settings *settings, const struct gpu_light *lights,
-                              uint32_t count, const struct gpu_frame *frame, const int tau_size[3])
+                              uint32_t count, const struct gpu_frame *frame)
 {
     const ivec4 dims = frame->lattice_dims;
     const size_t groups = groups_of(&dims);
@@ -62,12 +62,9 @@ uint64_t depths_working_bytes(const brume_settings *settings, const struct gpu_l
     for (uint32_t i = 0; i < count && !apart; ++i)
         if (depths_samples(&lights[i], frame->lattice_lower.w) > 1)
             apart = texture_bytes(dims.x, dims.y, EXTENDED_SAMPLES * dims.z);
-    const uint64_t all = texture_bytes(tau_size[0], tau_size[1], tau_size[2]);
-    /* Iterations go to and fro between two textures. */
+    bytes += apart;
     if (settings->depths == BRUME_DEPTHS_ITERATED)
-        bytes += 2 * apart > all ? 2 * apart : all;
-    else
-        bytes += apart;
+        bytes += 2 * texture_bytes(dims.x, dims.y, ((int)count / 4 + 1) * dims.z);
     return bytes;
 }
 
@@ -302,42 +299,55 @@ static brume_result gather_fronts(struct depths *depths)
     const int literal = input->settings->depths != BRUME_DEPTHS_CORRECTED;
     for (int front = 0; front < dims.x + dims.y + dims.z - 2; ++front) {
         TRY(check_cancel(input));
-        TRY(set_pass(depths, (struct gpu_lattice_pass){.offset = {0, front, literal, 0},
-                                                       .slab = {(int)depths->count, 0, 0, 0}}));
+        TRY(set_pass(depths,
+                     (struct gpu_lattice_pass){.offset = {(int)depths->count, front, literal, 0}}));
         program_dispatch(program, dims.x, dims.y, 2 * (int)depths->count);
         glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     }
     return BRUME_OK;
 }
 
-/* All nodes in every iteration, from one texture into another, as the paper has it. */
-static brume_result iterate(struct depths *depths)
+/* All nodes in every iteration, from one texture into another, four lights a texel: the paper's
+ * way.
+ */
+static brume_result iterate_in(struct depths *depths, struct texture textures[2])
 {
+    static const float unreached[4] = {-1, -1, -1, -1};
     const struct transport_input *input = depths->input;
-    struct memory *memory = &input->gpu->memory;
     const ivec4 dims = input->frame->lattice_dims;
+    const int count = (int)depths->count, tiles = (count + 3) / 4;
     const struct program *program;
-    struct texture *texture = depths->texture, other = {0};
-    TRY(program_compute(&input->gpu->programs, "opv_gather", &program));
-    TRY(texture_init(memory, &other, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F, texture->width,
-                     texture->height, texture->depth, 1, "optical depths before"));
-    glClearTexImage(texture->id, 0, GL_RGBA, GL_FLOAT, NULL);
-    brume_result result = BRUME_OK;
-    /* An even number, so that the last goes into the texture that is kept. */
-    const int fronts = (dims.x + dims.y + dims.z - 1) / 2 * 2;
-    for (int i = 0; i < fronts && result == BRUME_OK; ++i) {
-        glBindTextureUnit(SLOT_DEPTH_BEFORE, i % 2 ? other.id : texture->id);
-        bind_image(i % 2 ? texture : &other);
-        result = check_cancel(input);
-        if (result == BRUME_OK)
-            result =
-                set_pass(depths, (struct gpu_lattice_pass){.offset = {0, -1, 1, 0},
-                                                           .slab = {(int)depths->count, 0, 0, 0}});
-        if (result == BRUME_OK)
-            program_dispatch(program, dims.x, dims.y, dims.z * (int)depths->count);
+    TRY(program_compute(&input->gpu->programs, "opv_iterate", &program));
+    for (int i = 0; i < 2; ++i) {
+        TRY(texture_init(&input->gpu->memory, &textures[i], FOR_TRANSPORT, GL_TEXTURE_3D,
+                         GL_RGBA16F, texture_side(dims.x), texture_side(dims.y),
+                         texture_side(tiles * dims.z), 1, "depths to four lamps"));
+        glClearTexImage(textures[i].id, 0, GL_RGBA, GL_FLOAT, unreached);
+    }
+    const int fronts = dims.x + dims.y + dims.z - 2;
+    for (int i = 0; i < fronts; ++i) {
+        TRY(check_cancel(input));
+        glBindTextureUnit(SLOT_DEPTH_BEFORE, textures[i % 2].id);
+        bind_image(&textures[1 - i % 2]);
+        TRY(set_pass(depths, (struct gpu_lattice_pass){.offset = {count, -1, 0, 0}}));
+        program_dispatch(program, dims.x, dims.y, tiles * dims.z);
         glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     }
-    texture_finish(memory, &other);
+    glBindTextureUnit(SLOT_DEPTH_BEFORE, textures[fronts % 2].id);
+    bind_image(depths->texture);
+    for (int i = 0; i < count; ++i) {
+        TRY(set_pass(depths, (struct gpu_lattice_pass){.offset = {count, i, 0, 0}}));
+        program_dispatch(program, dims.x, dims.y, dims.z);
+    }
+    return BRUME_OK;
+}
+
+static brume_result iterate(struct depths *depths)
+{
+    struct texture textures[2] = {{0}};
+    const brume_result result = iterate_in(depths, textures);
+    for (int i = 0; i < 2; ++i)
+        texture_finish(&depths->input->gpu->memory, &textures[i]);
     return result;
 }
 

@@ -400,8 +400,11 @@ static void wavefront_is_what_iterations_come_to(void **state)
         for (int i = 0; i < dims[0] * dims[1] * dims[2]; ++i) {
             const int node[3] = {i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]};
             assert_true(depth_at(&a, a.lights, node, 1.0, 1) > 0.0);
-            assert_true(depth_at(&a, a.lights, node, 1.0, 1) ==
-                        depth_at(&b, b.lights, node, 1.0, 1));
+            /* The published way has one coefficient for all colours: their mean. */
+            double mean = 0.0;
+            for (int c = 0; c < 3; ++c)
+                mean += depth_at(&a, a.lights, node, 1.0, c) / 3.0;
+            assert_close(depth_at(&b, b.lights, node, 1.0, 1), mean, 0.01);
         }
         free(a.texels);
         free(b.texels);

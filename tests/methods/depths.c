@@ -502,6 +502,52 @@ static void gaussian_depths(void **state)
     }
 }
 
+/* --- Costs ---------------------------------------------------------------------------------- */
+
+/* The best of three propagations of that many moving lamps, ms; without what compiling takes. */
+static double propagation_ms(brume_scene *scene, uint32_t lamps, uint32_t depths)
+{
+    const brume_settings settings = {
+        .lattice_resolution = 40, .depths = depths, .light_samples = 1, .shadow_resolution = 16};
+    const brume_view view = orthographic_view(origin, (float[3]){0, 0, -1}, 1.0f, 5.0f, 8);
+    double best = INFINITY;
+    uint32_t lots = 11;
+    for (int time = 0; time < 4; ++time) {
+        for (uint64_t key = 1; key <= lamps; ++key) {
+            const float from[3] = {(float)lot(&lots), (float)lot(&lots), (float)lot(&lots)};
+            const brume_light lamp = point_lamp(from, 1.0f);
+            assert_ok(brume_scene_set_light(scene, key, &lamp));
+        }
+        brume_job *job = render(scene, &settings, &view);
+        brume_stats stats;
+        assert_ok(brume_job_stats(job, &stats));
+        assert_int_equal(stats.lights_propagated, lamps);
+        if (time > 0)
+            best = fmin(best, stats.stages[BRUME_STAGE_TRANSPORT].wall_ms);
+        brume_job_release(job);
+    }
+    return best;
+}
+
+/* By ratios far from what they are held to (80 and 1.1), whatever else the machine does. */
+static void what_ways_cost(void **state)
+{
+    (void)state;
+    const struct gaussians sixteen = scattered(16, 0.25, 0.5, 4.0);
+    brume_scene *scene = scene_of(&sixteen);
+    const double one = propagation_ms(scene, 1, BRUME_DEPTHS_PROPAGATED);
+    const double published = propagation_ms(scene, 1, BRUME_DEPTHS_ITERATED);
+    const double published_four = propagation_ms(scene, 4, BRUME_DEPTHS_ITERATED);
+    const double four = propagation_ms(scene, 4, BRUME_DEPTHS_PROPAGATED);
+    print_message(
+        "ms at 40^3, one lamp and four: bricks %.1f and %.1f, as published %.0f and %.0f\n", one,
+        four, published, published_four);
+    assert_true(published > 4.0 * one);
+    assert_true(published_four < 1.5 * published);
+    assert_true(published > four);
+    brume_scene_destroy(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -509,6 +555,7 @@ int main(void)
         cmocka_unit_test(homogeneous_in_26_directions),
         cmocka_unit_test(the_papers_increments),
         cmocka_unit_test(nothing_is_left_of_before),
+        cmocka_unit_test(what_ways_cost),
         cmocka_unit_test(many_lamps),
         cmocka_unit_test(lamp_in_a_solid),
         cmocka_unit_test(wavefront_is_what_iterations_come_to),

@@ -122,8 +122,10 @@ static void bind_image(const struct texture *texture)
     glBindImageTexture(SLOT_OUTPUT, texture->id, 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA16F);
 }
 
-static brume_result check_cancel(const struct transport_input *input)
+/* Between two steps: how many of all are done. */
+static brume_result go_on(const struct transport_input *input, size_t done, size_t all)
 {
+    job_report(input->control, BRUME_STAGE_TRANSPORT, 0.1f + 0.1f * (float)done / (float)all);
     return job_cancelled(input->control) ? fail(BRUME_E_CANCELLED, "cancelled") : BRUME_OK;
 }
 
@@ -233,7 +235,7 @@ static brume_result run_levels(struct depths *depths, const struct program *prog
     bind_image(depths->texture);
     for (int level = 0; level < list->levels; ++level) {
         const size_t count = list->first[level + 1] - list->first[level];
-        TRY(check_cancel(input));
+        TRY(go_on(input, (size_t)level, (size_t)list->levels));
         TRY(set_pass(depths, (struct gpu_lattice_pass){.offset = {(int)list->first[level]}}));
         program_dispatch(program, (int)count * program->group[0], 1, 1);
         /* What this level wrote, the next reads. */
@@ -277,7 +279,8 @@ static brume_result march(struct depths *depths)
     for (uint32_t i = 0; i < depths->count; ++i)
         for (int z = 0; z < dims.z; z += slab) {
             const int end = z + slab < dims.z ? z + slab : dims.z;
-            TRY(check_cancel(input));
+            TRY(go_on(input, (size_t)i * (size_t)dims.z + (size_t)z,
+                      depths->count * (size_t)dims.z));
             TRY(set_pass(depths,
                          (struct gpu_lattice_pass){.offset = {(int)i}, .slab = {0, 0, z, end}}));
             program_dispatch(program, dims.x, dims.y, end - z);
@@ -297,8 +300,9 @@ static brume_result gather_fronts(struct depths *depths)
     bind_image(depths->texture);
     glBindTextureUnit(SLOT_DEPTH_BEFORE, depths->texture->id);
     const int literal = input->settings->depths != BRUME_DEPTHS_CORRECTED;
-    for (int front = 0; front < dims.x + dims.y + dims.z - 2; ++front) {
-        TRY(check_cancel(input));
+    const int fronts = dims.x + dims.y + dims.z - 2;
+    for (int front = 0; front < fronts; ++front) {
+        TRY(go_on(input, (size_t)front, (size_t)fronts));
         TRY(set_pass(depths,
                      (struct gpu_lattice_pass){.offset = {(int)depths->count, front, literal, 0}}));
         program_dispatch(program, dims.x, dims.y, 2 * (int)depths->count);
@@ -326,7 +330,7 @@ static brume_result iterate_in(struct depths *depths, struct texture textures[2]
     }
     const int fronts = dims.x + dims.y + dims.z - 2;
     for (int i = 0; i < fronts; ++i) {
-        TRY(check_cancel(input));
+        TRY(go_on(input, (size_t)i, (size_t)fronts));
         glBindTextureUnit(SLOT_DEPTH_BEFORE, textures[i % 2].id);
         bind_image(&textures[1 - i % 2]);
         TRY(set_pass(depths, (struct gpu_lattice_pass){.offset = {count, -1, 0, 0}}));

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the Markdown tables of the docs from the JSON lines of bench/peers.py, viewport.py or
-export.py.
+"""Makes the Markdown tables of the docs from the JSON lines of bench/peers.py, viewport.py,
+export.py or opv.py.
 
     python3 bench/table.py FILE.jsonl [--into docs/PAGE.md]
 
 Takes the newest line of each scene, resolution, engine and device. With --into, the tables replace
-what stands between <!-- bench:peers --> and <!-- /bench:peers -->, or bench:viewport or
-bench:export, in the page.
+what stands between <!-- bench:peers --> and <!-- /bench:peers -->, or bench:viewport and so on, in
+the page.
 """
 import argparse
 import json
@@ -133,7 +133,53 @@ def export_page(lines):
     yield ''
 
 
+WAYS = {'PROPAGATED': 'Brume: from brick to brick', 'MARCHED': 'each node marched',
+        'CORRECTED': 'six neighbours, corrected',
+        'PAPER': 'six neighbours, as published, by wavefronts',
+        'ITERATED': 'as published: all nodes in all iterations'}
+
+
+def opv_page(lines):
+    line = lines[-1]
+    width, height = line['resolution']
+    yield (f'{line["device"]}; {line["processor"]}, {line["threads"]} threads; commit '
+           f'{version(line)}. Pictures of {width}x{height} pixels, one sample each.')
+    yield ''
+    yield 'Frames a second; in brackets the propagation in them, ms (the paper\'s Table 2):'
+    yield ''
+    columns = next(iter(line['table_2'].values()))
+    yield row('cells', *(f'{name} lights' if name.isdigit() else '1 light, static'
+                         for name in columns))
+    yield row('---', *['---:'] * len(columns))
+    for size, cells in line['table_2'].items():
+        yield row(f'{size}³', *(
+            f'{1000 / cell["frame_ms"]:.0f}' + (f' ({cell["propagation_ms"]:.1f})'
+                                                if name.isdigit() else '')
+            for name, cell in cells.items()))
+    yield ''
+    yield 'Frames a second with 20³ cells and two lights (the paper\'s Table 3):'
+    yield ''
+    yield row('Gaussians', 'all of them changing', 'static')
+    yield row('---:', '---:', '---:')
+    for count, cells in line['table_3'].items():
+        yield row(count, *(f'{1000 / cells[key]["frame_ms"]:.0f}' for key in ('dynamic', 'static')))
+    yield ''
+    yield 'Propagation at 40³, ms:'
+    yield ''
+    yield row('', *(f'{lights} lights' for lights in next(iter(line['ways'].values()))))
+    yield row('---', *['---:'] * len(next(iter(line['ways'].values()))))
+    for way, cells in line['ways'].items():
+        yield row(WAYS[way], *(f'{cell["propagation_ms"]:.1f}' for cell in cells.values()))
+    yield ''
+    many = line['many']
+    yield (f'{many["lights"]} lights at {many["cells"]}³: {many["frame_ms"] / 1000:.1f} s for the '
+           f'frame that propagates all of them, {mebibytes(many["transport_bytes"])} MiB for their '
+           f'depths.')
+    yield ''
+
+
 PAGES = {'peers': page, 'viewport': viewport_page}
+WHOLE_PAGES = {'export': export_page, 'opv': opv_page}
 
 
 def main():
@@ -143,7 +189,8 @@ def main():
     options = parser.parse_args()
     lines = read(options.lines)
     bench = lines[-1].get('bench', 'peers')
-    text = '\n'.join(export_page(lines) if bench == 'export' else PAGES[bench](newest(lines)))
+    text = '\n'.join(WHOLE_PAGES[bench](lines) if bench in WHOLE_PAGES
+                     else PAGES[bench](newest(lines)))
     if not options.into:
         print(text)
         return

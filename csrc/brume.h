@@ -431,7 +431,9 @@ typedef enum brume_depths {
                                         has it, with increments as long as the step */
     BRUME_DEPTHS_PAPER = 3,          /* for comparison: the paper's increments, too large where light
                                         runs askew to the lattice */
-    BRUME_DEPTHS_ITERATED = 4,       /* for comparison: as 3, all nodes in every iteration */
+    BRUME_DEPTHS_ITERATED = 4,       /* for comparison: as 3 and as published: all nodes in every
+                                        iteration, four lights together, one extinction for all
+                                        colours */
     BRUME_DEPTHS_COUNT = 5
 } brume_depths;
 

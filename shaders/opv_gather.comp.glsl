@@ -6,12 +6,12 @@
 #version 450 core
 #include "lib/depth.glsl"
 
-layout(local_size_x = GROUP_CELLS, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
+layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
-    // offset.x: first source; y: nodes from the light along the axes that are to be computed, -1 for
-    // all whose neighbours are; z: 1 literally
+    // offset.x: sources; y: steps along the axes from the light to the nodes of this wavefront; z: 1
+    // literally
     gpu_lattice_pass stage;
 };
 
@@ -25,8 +25,7 @@ float kept_over(light_way way)
     return stage.offset.z != 0 ? max(way_length, frame.lattice_lower.w) : way_length;
 }
 
-// False where a neighbour is not computed yet.
-bool gather(gpu_depth_source source, ivec3 node, inout vec4 texel)
+vec4 gather(gpu_depth_source source, ivec3 node)
 {
     vec3 p = node_position(node);
     light_way way = way_to(source, p);
@@ -40,12 +39,10 @@ bool gather(gpu_depth_source source, ivec3 node, inout vec4 texel)
             continue;
         ivec3 neighbour = node;
         neighbour[i] -= sign(steps[i]);
-        vec4 before = texelFetch(depth_before, neighbour + source.tile.xyz, 0);
-        if (before.a == 0.0)
-            return false;
+        vec3 before = texelFetch(depth_before, neighbour + source.tile.xyz, 0).rgb;
         if (stage.offset.z != 0)
-            before.rgb *= kept_over(way_to(source, node_position(neighbour)));
-        around += weight * before.rgb;
+            before *= kept_over(way_to(source, node_position(neighbour)));
+        around += weight * before;
         weights += weight;
     }
     vec3 here = extinction_at(p);
@@ -57,37 +54,22 @@ bool gather(gpu_depth_source source, ivec3 node, inout vec4 texel)
                   ? here * h + around
                   : here * step_length + around * (way.to - way.from - step_length);
     }
-    texel = depth_texel(tau, kept_over(way), p);
-    return true;
+    return depth_texel(tau, kept_over(way), p);
 }
 
 void main()
 {
     ivec3 node = ivec3(gl_GlobalInvocationID);
-    int number = stage.offset.x;
-    gpu_depth_source source;
-    vec4 texel = vec4(0.0);
-    if (stage.offset.y >= 0) {
-        number += node.z / 2;
-        source = sources[number];
-        ivec2 steps = abs(node.xy - source.node.xy);
-        int rest = stage.offset.y - steps.x - steps.y;
-        bool below = (node.z & 1) != 0;
-        if (rest < 0 || (rest == 0 && below))
-            return;
-        node.z = source.node.z + (below ? -rest : rest);
-        if (node.z < 0)
-            return;
-    } else {
-        number += node.z / frame.lattice_dims.z;
-        node.z = node.z % frame.lattice_dims.z;
-        source = sources[number];
-    }
-    if (number >= stage.slab.x || any(greaterThanEqual(node, frame.lattice_dims.xyz)))
+    int number = node.z / 2;
+    if (number >= stage.offset.x)
         return;
-    if (stage.offset.y < 0)
-        texel = texelFetch(depth_before, node + source.tile.xyz, 0);
-    if (texel.a == 0.0)
-        gather(source, node, texel);
-    imageStore(depth_image, node + source.tile.xyz, texel);
+    gpu_depth_source source = sources[number];
+    ivec2 steps = abs(node.xy - source.node.xy);
+    int rest = stage.offset.y - steps.x - steps.y;
+    bool below = (node.z & 1) != 0;
+    node.z = source.node.z + (below ? -rest : rest);
+    if (rest < 0 || (rest == 0 && below) || any(lessThan(node, ivec3(0))) ||
+        any(greaterThanEqual(node, frame.lattice_dims.xyz)))
+        return;
+    imageStore(depth_image, node + source.tile.xyz, gather(source, node));
 }

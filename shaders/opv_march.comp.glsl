@@ -4,7 +4,7 @@
 #version 450 core
 #include "lib/depth.glsl"
 
-layout(local_size_x = GROUP_CELLS, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
+layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {

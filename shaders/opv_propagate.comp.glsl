@@ -6,35 +6,43 @@
 #version 450 core
 #include "lib/depth.glsl"
 
-layout(local_size_x = GROUP_BRICK, local_size_y = GROUP_BRICK, local_size_z = GROUP_BRICK) in;
+layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
-    gpu_lattice_pass stage; // offset.x: first brick
+    gpu_lattice_pass stage; // offset.x: first group
 };
 
-layout(std430, binding = SLOT_DEPTH_BRICKS) readonly buffer bricks_block
+layout(std430, binding = SLOT_DEPTH_GROUPS) readonly buffer groups_block
 {
-    ivec4 bricks[]; // first node; w: source
+    ivec4 groups[]; // first node; w: source
 };
 
 layout(binding = SLOT_DEPTH_BEFORE) uniform sampler3D depth_before; // the image, as it was
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D depth_image;
 
-// How far along the way the nodes around a point are all nearer to the light by a brick.
-float way_to_nearer_bricks(ivec3 node, ivec3 first, ivec3 origin, vec3 towards)
+// Nodes that a look-up stays clear of those that are not computed yet: what the sampler rounds.
+const float CLEAR = 0.002;
+
+// How far along the way all nodes around a point are in bricks nearer to the light.
+float way_to_nearer_bricks(ivec3 steps, vec3 towards)
 {
-    vec3 speed = abs(towards) / frame.lattice_lower.w; // nodes a metre
-    float nearest = 1e30;
-    for (int i = 0; i < 3; ++i) {
-        // Nodes from the light's cell to the brick, and to this node.
-        bool above = first[i] > origin[i];
-        int start = above ? first[i] - origin[i] - 1 : origin[i] - first[i] - (GROUP_BRICK - 1);
-        int steps = above ? node[i] - origin[i] - 1 : origin[i] - node[i];
-        if (start > 0)
-            nearest = min(nearest, float(steps - start + 1) / max(speed[i], 1e-20));
-    }
-    return nearest;
+    ivec3 start = steps & ~(BRICK_NODES - 1);
+    vec3 way = (vec3(steps - start) + (1.0 + CLEAR)) * frame.lattice_lower.w /
+               max(abs(towards), vec3(1e-20));
+    way = mix(way, vec3(1e30), equal(start, ivec3(0)));
+    return min(way.x, min(way.y, way.z));
+}
+
+vec3 before_at(gpu_depth_source source, ivec3 node, vec3 p)
+{
+    // In nodes; along an axis across the way no further from the light than the node itself.
+    vec3 at = (p - frame.lattice_lower.xyz) / frame.lattice_lower.w;
+    vec3 side = mix(vec3(-1.0), vec3(1.0), greaterThan(node, source.node.xyz));
+    at = vec3(node) - side * max(side * (vec3(node) - at), vec3(CLEAR));
+    at = clamp(at, vec3(CLEAR), vec3(frame.lattice_dims.xyz - 1) - CLEAR);
+    vec3 texel = at + vec3(source.tile.xyz) + 0.5;
+    return textureLod(depth_before, texel / vec3(textureSize(depth_before, 0)), 0.0).rgb;
 }
 
 // As medium_tau, over a stretch too short to gain from what empty bricks save.
@@ -55,20 +63,18 @@ vec3 short_tau(vec3 origin, vec3 direction, float from, float to)
 
 void main()
 {
-    ivec4 brick = bricks[stage.offset.x + int(gl_WorkGroupID.x)];
-    ivec3 node = brick.xyz + ivec3(gl_LocalInvocationID);
+    ivec4 group = groups[stage.offset.x + int(gl_WorkGroupID.x)];
+    ivec3 node = group.xyz + ivec3(gl_LocalInvocationID);
     if (any(lessThan(node, ivec3(0))) || any(greaterThanEqual(node, frame.lattice_dims.xyz)))
         return;
-    gpu_depth_source source = sources[brick.w];
+    gpu_depth_source source = sources[group.w];
     vec3 p = node_position(node);
     light_way way = way_to(source, p);
-    float end = min(way_to_nearer_bricks(node, brick.xyz, source.node.xyz, way.towards), way.to);
+    // Nodes from the light's cell.
+    ivec3 steps = max(node - source.node.xyz - 1, source.node.xyz - node);
+    float end = min(way_to_nearer_bricks(steps, way.towards), way.to);
     vec3 tau = short_tau(p, way.towards, way.from, end);
-    if (end < way.to) {
-        vec3 at = clamp((p + way.towards * end - frame.lattice_lower.xyz) / frame.lattice_lower.w,
-                        vec3(0.0), vec3(frame.lattice_dims.xyz - 1));
-        at = (at + vec3(source.tile.xyz) + 0.5) / vec3(textureSize(depth_before, 0));
-        tau += textureLod(depth_before, at, 0.0).rgb * (way.to - max(end, way.from));
-    }
+    if (end < way.to)
+        tau += before_at(source, node, p + way.towards * end) * (way.to - max(end, way.from));
     imageStore(depth_image, node + source.tile.xyz, depth_texel(tau, way.to - way.from, p));
 }

@@ -245,7 +245,7 @@ class BRUME_PT_fog(_FogPanel, bpy.types.Panel):
         layout = self.split()
         layout.prop(source, "source")
         if source.source == 'PARTICLES':
-            layout.prop(source, "particle_system", icon='PARTICLES')
+            layout.prop(source, "particle_system", text="System", icon='PARTICLES')
         column = layout.column(align=True)
         column.prop(source, "radius")
         column.prop(source, "density")

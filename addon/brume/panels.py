@@ -69,6 +69,17 @@ class BRUME_PT_volumes(_Rows, _RenderPanel, bpy.types.Panel):
     rows = ("method", "medium_resolution", "lattice_resolution", "step")
 
 
+class BRUME_PT_single_scattering(_Rows, _RenderPanel, bpy.types.Panel):
+    bl_label = "Single Scattering"
+    bl_parent_id = "BRUME_PT_volumes"
+    bl_options = {'DEFAULT_CLOSED'}
+    rows = ("depths",)
+
+    @classmethod
+    def applies(cls, context):
+        return context.scene.brume.method == 'OPV'
+
+
 class BRUME_PT_world_volume(_RenderPanel, bpy.types.Panel):
     bl_label = "World Volume"
     bl_parent_id = "BRUME_PT_volumes"
@@ -235,7 +246,8 @@ class BRUME_PT_light_nodes(_LightPanel, bpy.types.Panel):
 
 
 _CLASSES = (BRUME_PT_sampling, BRUME_PT_sampling_advanced, BRUME_PT_volumes,
-            BRUME_PT_world_volume, BRUME_PT_lights, BRUME_PT_film, BRUME_PT_performance,
+            BRUME_PT_single_scattering, BRUME_PT_world_volume, BRUME_PT_lights, BRUME_PT_film,
+            BRUME_PT_performance,
             BRUME_PT_passes, BRUME_PT_override, BRUME_PT_ray_visibility,
             BRUME_PT_material_settings, BRUME_PT_light, BRUME_PT_light_spot,
             BRUME_PT_light_nodes)

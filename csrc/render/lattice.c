@@ -184,8 +184,7 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
                 pack(medium->lower, nodes_of(&box, resolution, &frame->lattice_dims));
             if (layout_tiles(renderer, gpu->context.info.max_texture_3d) &&
                 tau_bytes(renderer) + depths_working_bytes(settings, renderer->shadows.lights,
-                                                           renderer->shadows.light_count, frame,
-                                                           renderer->tau_size) <=
+                                                           renderer->shadows.light_count, frame) <=
                     renderer->shares.depth)
                 break;
             if (resolution == 1)

@@ -64,8 +64,10 @@ static const char help[] =
     "      --lattice-resolution N  the same for the light's lattice (default: 64)\n"
     "      --shadow-resolution N   texels along a shadow map's side (default: 512)\n"
     "      --light-samples N       shadow maps spread over each lamp (default: 8)\n"
-    "      --world-samples N       directions that stand for the world's light (default: 32)\n"
+    "      --world-samples N       directions that stand for the world's light (default: 128)\n"
     "      --step X                march step in cells of the medium (default: 1)\n"
+    "      --depths WAY            optical depths to the lamps: propagated (the default), marched\n"
+    "                              (exact, slower); corrected or paper, to compare\n"
     "      --memory-budget MIB     on the GPU (default: 2048)\n"
     "\n"
     "Output\n"
@@ -362,6 +364,21 @@ static bool parse_memory_budget(const char *option, const char *text, options *o
     return true;
 }
 
+static bool parse_depths(const char *option, const char *text, options *out)
+{
+    static const char *const ways[] = {[BRUME_DEPTHS_PROPAGATED] = "propagated",
+                                       [BRUME_DEPTHS_MARCHED] = "marched",
+                                       [BRUME_DEPTHS_CORRECTED] = "corrected",
+                                       [BRUME_DEPTHS_PAPER] = "paper"};
+    for (uint32_t way = 0; way < sizeof ways / sizeof *ways; ++way)
+        if (strcmp(text, ways[way]) == 0) {
+            out->settings.depths = way;
+            return true;
+        }
+    usage_error("--%s wants propagated, marched, corrected or paper, not '%s'", option, text);
+    return false;
+}
+
 /* What an option's value is, and so how it is read. */
 enum kind {
     KIND_FLAG,     /* bool, no value */
@@ -433,6 +450,7 @@ static const struct spec specs[] = {
     {"light-samples", KIND_COUNT, AT(settings.light_samples), .upper = 4096},
     {"world-samples", KIND_COUNT, AT(settings.world_samples), .upper = 4096},
     {"step", KIND_NUMBER, AT(settings.step), .lower = 0.01f, .upper = 100.0f},
+    {"depths", KIND_OWN, .parse = parse_depths},
     {"memory-budget", KIND_OWN, .parse = parse_memory_budget},
 };
 

@@ -9,8 +9,8 @@
 
 /* Samples whose transmittances are averaged for a light with extent; at most 8 (opv_merge). */
 #define EXTENDED_SAMPLES 4
-/* Bricks whose list is on the GPU at once; lamps beyond wait for the next. */
-#define BRICKS_AT_ONCE 16384
+/* Groups whose list is on the GPU at once; lamps beyond wait for the next. */
+#define GROUPS_AT_ONCE 65536
 #define NODE_BYTES 8
 
 uint32_t depths_samples(const struct gpu_light *light, float cell)
@@ -33,14 +33,11 @@ uint32_t depths_samples(const struct gpu_light *light, float cell)
     return light->samples.y < EXTENDED_SAMPLES ? light->samples.y : EXTENDED_SAMPLES;
 }
 
-/* At most so many bricks has a lattice, wherever the light is. */
-static size_t bricks_of(const ivec4 *dims)
+/* At most so many groups has a lattice, wherever the light is. */
+static size_t groups_of(const ivec4 *dims)
 {
-    const int *side = &dims->x;
-    size_t bricks = 1;
-    for (int i = 0; i < 3; ++i)
-        bricks *= (size_t)side[i] / GROUP_BRICK + 2;
-    return bricks;
+    return ((size_t)dims->x / GROUP_LANES + 2) * ((size_t)dims->y / GROUP_CELLS + 2) *
+           ((size_t)dims->z / GROUP_CELLS + 2);
 }
 
 static uint64_t texture_bytes(int width, int height, int depth)
@@ -50,27 +47,24 @@ static uint64_t texture_bytes(int width, int height, int depth)
 }
 
 uint64_t depths_working_bytes(const brume_settings *settings, const struct gpu_light *lights,
-                              uint32_t count, const struct gpu_frame *frame, const int tau_size[3])
+                              uint32_t count, const struct gpu_frame *frame)
 {
     const ivec4 dims = frame->lattice_dims;
-    const size_t bricks = bricks_of(&dims);
-    const size_t listed = bricks * (count ? count : 1);
+    const size_t groups = groups_of(&dims);
+    const size_t listed = groups * (count ? count : 1);
     uint64_t bytes = (uint64_t)(count + EXTENDED_SAMPLES + 1) * sizeof(struct gpu_depth_source) +
                      2 * sizeof(struct gpu_lattice_pass);
     if (settings->depths == BRUME_DEPTHS_PROPAGATED)
-        bytes += sizeof(ivec4) * (uint64_t)(listed < BRICKS_AT_ONCE   ? listed
-                                            : bricks < BRICKS_AT_ONCE ? BRICKS_AT_ONCE
-                                                                      : bricks);
+        bytes += sizeof(ivec4) * (uint64_t)(listed < GROUPS_AT_ONCE   ? listed
+                                            : groups < GROUPS_AT_ONCE ? GROUPS_AT_ONCE
+                                                                      : groups);
     uint64_t apart = 0;
     for (uint32_t i = 0; i < count && !apart; ++i)
         if (depths_samples(&lights[i], frame->lattice_lower.w) > 1)
             apart = texture_bytes(dims.x, dims.y, EXTENDED_SAMPLES * dims.z);
-    const uint64_t all = texture_bytes(tau_size[0], tau_size[1], tau_size[2]);
-    /* Iterations go to and fro between two textures. */
+    bytes += apart;
     if (settings->depths == BRUME_DEPTHS_ITERATED)
-        bytes += 2 * apart > all ? 2 * apart : all;
-    else
-        bytes += apart;
+        bytes += 2 * texture_bytes(dims.x, dims.y, ((int)count / 4 + 1) * dims.z);
     return bytes;
 }
 
@@ -82,7 +76,7 @@ struct depths {
     struct texture *texture;
     const struct gpu_depth_source *sources;
     uint32_t count;
-    struct buffer block, bricks;
+    struct buffer block, groups;
 };
 
 static int is_paper(const struct transport_input *input)
@@ -128,112 +122,120 @@ static void bind_image(const struct texture *texture)
     glBindImageTexture(SLOT_OUTPUT, texture->id, 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA16F);
 }
 
-static brume_result check_cancel(const struct transport_input *input)
+/* Between two steps: how many of all are done. */
+static brume_result go_on(const struct transport_input *input, size_t done, size_t all)
 {
+    job_report(input->control, BRUME_STAGE_TRANSPORT, 0.1f + 0.1f * (float)done / (float)all);
     return job_cancelled(input->control) ? fail(BRUME_E_CANCELLED, "cancelled") : BRUME_OK;
 }
 
 /* --- Propagation --------------------------------------------------------------------------- */
 
-/* The bricks along one axis: their first nodes, by their level, which is how many bricks the light
- * passes before. Bricks at both sides of the light are of one level. */
-struct brick_row {
-    int *first; /* two a level; INT32_MIN: none */
-    int levels;
+/* Along an axis the lattice is cut into groups, at both sides of the light. Their level is how many
+ * bricks the light passes before. */
+struct axis_groups {
+    int origin, nodes, side; /* side: nodes along a group */
 };
 
-#define NO_BRICK INT32_MIN
+#define NO_GROUP INT32_MIN
 
-static brume_result row_init(struct brick_row *row, int origin, int nodes)
+/* The first node of the group that begins so many steps from the light, on either side. */
+static int group_first(const struct axis_groups *axis, int steps, int below)
 {
-    const int above = nodes - 1 - origin, below = origin + 1;
-    const int longer = above > below ? above : below;
-    row->levels = (longer + GROUP_BRICK - 1) / GROUP_BRICK;
-    row->first = malloc(2 * (size_t)row->levels * sizeof *row->first);
-    if (!row->first)
-        return fail(BRUME_E_MEMORY, "no memory for the bricks of a lattice");
-    for (int level = 0; level < row->levels; ++level) {
-        const int step = level * GROUP_BRICK;
-        row->first[2 * level] = step < above ? origin + 1 + step : NO_BRICK;
-        row->first[2 * level + 1] = step < below ? origin - step - (GROUP_BRICK - 1) : NO_BRICK;
-    }
-    return BRUME_OK;
+    if (below)
+        return axis->origin - steps >= 0 ? axis->origin - steps - (axis->side - 1) : NO_GROUP;
+    return axis->origin + 1 + steps < axis->nodes ? axis->origin + 1 + steps : NO_GROUP;
 }
 
-/* Appends a source's bricks of one level, or only counts them. */
-static size_t list_level(const struct brick_row rows[3], int level, int source, ivec4 *out)
+static int steps_of(const struct axis_groups *axis)
+{
+    const int above = axis->nodes - 1 - axis->origin, below = axis->origin + 1;
+    return above > below ? above : below;
+}
+
+static void cut_axes(const struct depths *depths, uint32_t source, const struct program *program,
+                     struct axis_groups axes[3])
+{
+    const int *nodes = &depths->input->frame->lattice_dims.x;
+    const int *origin = &depths->sources[source].node.x;
+    for (int i = 0; i < 3; ++i)
+        axes[i] = (struct axis_groups){origin[i], nodes[i], program->group[i]};
+}
+
+/* Appends a source's groups of one level to out, unless it is NULL; their number. */
+static size_t list_level(const struct axis_groups axes[3], int level, int source, ivec4 *out)
 {
     size_t count = 0;
-    for (int x = 0; x < 2 * rows[0].levels; ++x)
-        for (int y = 0; y < 2 * rows[1].levels; ++y)
-            for (int side = 0; side < 2; ++side) {
-                const int z = level - x / 2 - y / 2;
-                if (z < 0 || z >= rows[2].levels)
-                    continue;
-                const ivec4 brick = {rows[0].first[x], rows[1].first[y],
-                                     rows[2].first[2 * z + side], source};
-                if (brick.x == NO_BRICK || brick.y == NO_BRICK || brick.z == NO_BRICK)
-                    continue;
-                if (out)
-                    out[count] = brick;
-                ++count;
-            }
+    for (int x = 0; x < steps_of(&axes[0]); x += axes[0].side)
+        for (int y = 0; y < steps_of(&axes[1]); y += axes[1].side) {
+            const int brick = (level - x / BRICK_NODES - y / BRICK_NODES) * BRICK_NODES;
+            for (int z = brick; z < brick + BRICK_NODES && z >= 0; z += axes[2].side)
+                for (int sides = 0; sides < 8; ++sides) {
+                    const ivec4 group = {group_first(&axes[0], x, sides & 1),
+                                         group_first(&axes[1], y, sides & 2),
+                                         group_first(&axes[2], z, sides & 4), source};
+                    if (group.x == NO_GROUP || group.y == NO_GROUP || group.z == NO_GROUP)
+                        continue;
+                    if (out)
+                        out[count] = group;
+                    ++count;
+                }
+        }
     return count;
 }
 
-/* The bricks of some sources, level by level. */
-struct brick_list {
-    ivec4 *bricks;
+/* The groups of some sources, level by level. */
+struct group_list {
+    ivec4 *groups;
     size_t *first; /* levels + 1 */
     int levels;
 };
 
-static brume_result list_bricks(const struct depths *depths, uint32_t from, uint32_t end,
-                                struct brick_row *rows, struct brick_list *list)
+static brume_result list_groups(const struct depths *depths, const struct program *program,
+                                uint32_t from, uint32_t end, struct group_list *list)
 {
-    const int *dims = &depths->input->frame->lattice_dims.x;
+    struct axis_groups axes[3];
     for (uint32_t i = from; i < end; ++i) {
-        const int *origin = &depths->sources[i].node.x;
+        cut_axes(depths, i, program, axes);
         int levels = 1;
-        for (int axis = 0; axis < 3; ++axis) {
-            struct brick_row *row = &rows[3 * (i - from) + (uint32_t)axis];
-            TRY(row_init(row, origin[axis], dims[axis]));
-            levels += row->levels - 1;
-        }
+        for (int axis = 0; axis < 3; ++axis)
+            levels += (steps_of(&axes[axis]) - 1) / BRICK_NODES;
         list->levels = levels > list->levels ? levels : list->levels;
     }
     list->first = calloc((size_t)list->levels + 1, sizeof *list->first);
     if (!list->first)
-        return fail(BRUME_E_MEMORY, "no memory for the bricks of a lattice");
-    for (int level = 0; level < list->levels; ++level) {
-        list->first[level + 1] = list->first[level];
-        for (uint32_t i = from; i < end; ++i)
-            list->first[level + 1] += list_level(rows + 3 * (i - from), level, (int)i, NULL);
+        return fail(BRUME_E_MEMORY, "no memory to order a lattice");
+    for (int pass = 0; pass < 2; ++pass) {
+        size_t count = 0;
+        for (int level = 0; level < list->levels; ++level) {
+            for (uint32_t i = from; i < end; ++i) {
+                cut_axes(depths, i, program, axes);
+                count +=
+                    list_level(axes, level, (int)i, list->groups ? list->groups + count : NULL);
+            }
+            list->first[level + 1] = count;
+        }
+        if (pass == 0)
+            list->groups = malloc((count + 1) * sizeof *list->groups);
+        if (!list->groups)
+            return fail(BRUME_E_MEMORY, "no memory to order a lattice");
     }
-    list->bricks = malloc(list->first[list->levels] * sizeof *list->bricks);
-    if (!list->bricks)
-        return fail(BRUME_E_MEMORY, "no memory for the bricks of a lattice");
-    ivec4 *next = list->bricks;
-    for (int level = 0; level < list->levels; ++level)
-        for (uint32_t i = from; i < end; ++i)
-            next += list_level(rows + 3 * (i - from), level, (int)i, next);
     return BRUME_OK;
 }
 
-static brume_result run_levels(struct depths *depths, const struct brick_list *list)
+static brume_result run_levels(struct depths *depths, const struct program *program,
+                               const struct group_list *list)
 {
     const struct transport_input *input = depths->input;
-    const struct program *program;
-    TRY(program_compute(&input->gpu->programs, "opv_propagate", &program));
-    TRY(buffer_update(&input->gpu->memory, &depths->bricks, FOR_TRANSPORT,
-                      list->first[list->levels] * sizeof *list->bricks, list->bricks,
-                      "depth bricks"));
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_DEPTH_BRICKS, depths->bricks.id);
+    TRY(buffer_update(&input->gpu->memory, &depths->groups, FOR_TRANSPORT,
+                      list->first[list->levels] * sizeof *list->groups, list->groups,
+                      "depth groups"));
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_DEPTH_GROUPS, depths->groups.id);
     glBindTextureUnit(SLOT_DEPTH_BEFORE, depths->texture->id);
     bind_image(depths->texture);
     for (int level = 0; level < list->levels; ++level) {
         const size_t count = list->first[level + 1] - list->first[level];
-        TRY(check_cancel(input));
+        TRY(go_on(input, (size_t)level, (size_t)list->levels));
         TRY(set_pass(depths, (struct gpu_lattice_pass){.offset = {(int)list->first[level]}}));
         program_dispatch(program, (int)count * program->group[0], 1, 1);
         /* What this level wrote, the next reads. */
@@ -242,25 +244,22 @@ static brume_result run_levels(struct depths *depths, const struct brick_list *l
     return BRUME_OK;
 }
 
-/* Work grows with the nodes: every brick of every source is computed once. */
+/* Work grows with the nodes: every one is computed once a source. */
 static brume_result propagate(struct depths *depths)
 {
-    const size_t bricks = bricks_of(&depths->input->frame->lattice_dims);
-    const uint32_t most = bricks < BRICKS_AT_ONCE ? (uint32_t)(BRICKS_AT_ONCE / bricks) : 1;
+    const struct program *program;
+    TRY(program_compute(&depths->input->gpu->programs, "opv_propagate", &program));
+    const size_t groups = groups_of(&depths->input->frame->lattice_dims);
+    const uint32_t most = groups < GROUPS_AT_ONCE ? (uint32_t)(GROUPS_AT_ONCE / groups) : 1;
     brume_result result = BRUME_OK;
     for (uint32_t from = 0; from < depths->count && result == BRUME_OK; from += most) {
         const uint32_t end = from + most < depths->count ? from + most : depths->count;
-        struct brick_list list = {0};
-        struct brick_row *rows = calloc(3 * (size_t)(end - from), sizeof *rows);
-        result = rows ? list_bricks(depths, from, end, rows, &list)
-                      : fail(BRUME_E_MEMORY, "no memory for the bricks of a lattice");
+        struct group_list list = {0};
+        result = list_groups(depths, program, from, end, &list);
         if (result == BRUME_OK)
-            result = run_levels(depths, &list);
-        for (uint32_t i = 0; rows && i < 3 * (end - from); ++i)
-            free(rows[i].first);
-        free(rows);
+            result = run_levels(depths, program, &list);
         free(list.first);
-        free(list.bricks);
+        free(list.groups);
     }
     return result;
 }
@@ -280,7 +279,8 @@ static brume_result march(struct depths *depths)
     for (uint32_t i = 0; i < depths->count; ++i)
         for (int z = 0; z < dims.z; z += slab) {
             const int end = z + slab < dims.z ? z + slab : dims.z;
-            TRY(check_cancel(input));
+            TRY(go_on(input, (size_t)i * (size_t)dims.z + (size_t)z,
+                      depths->count * (size_t)dims.z));
             TRY(set_pass(depths,
                          (struct gpu_lattice_pass){.offset = {(int)i}, .slab = {0, 0, z, end}}));
             program_dispatch(program, dims.x, dims.y, end - z);
@@ -300,44 +300,58 @@ static brume_result gather_fronts(struct depths *depths)
     bind_image(depths->texture);
     glBindTextureUnit(SLOT_DEPTH_BEFORE, depths->texture->id);
     const int literal = input->settings->depths != BRUME_DEPTHS_CORRECTED;
-    for (int front = 0; front < dims.x + dims.y + dims.z - 2; ++front) {
-        TRY(check_cancel(input));
-        TRY(set_pass(depths, (struct gpu_lattice_pass){.offset = {0, front, literal, 0},
-                                                       .slab = {(int)depths->count, 0, 0, 0}}));
+    const int fronts = dims.x + dims.y + dims.z - 2;
+    for (int front = 0; front < fronts; ++front) {
+        TRY(go_on(input, (size_t)front, (size_t)fronts));
+        TRY(set_pass(depths,
+                     (struct gpu_lattice_pass){.offset = {(int)depths->count, front, literal, 0}}));
         program_dispatch(program, dims.x, dims.y, 2 * (int)depths->count);
         glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     }
     return BRUME_OK;
 }
 
-/* All nodes in every iteration, from one texture into another, as the paper has it. */
-static brume_result iterate(struct depths *depths)
+/* All nodes in every iteration, from one texture into another, four lights a texel: the paper's
+ * way.
+ */
+static brume_result iterate_in(struct depths *depths, struct texture textures[2])
 {
+    static const float unreached[4] = {-1, -1, -1, -1};
     const struct transport_input *input = depths->input;
-    struct memory *memory = &input->gpu->memory;
     const ivec4 dims = input->frame->lattice_dims;
+    const int count = (int)depths->count, tiles = (count + 3) / 4;
     const struct program *program;
-    struct texture *texture = depths->texture, other = {0};
-    TRY(program_compute(&input->gpu->programs, "opv_gather", &program));
-    TRY(texture_init(memory, &other, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F, texture->width,
-                     texture->height, texture->depth, 1, "optical depths before"));
-    glClearTexImage(texture->id, 0, GL_RGBA, GL_FLOAT, NULL);
-    brume_result result = BRUME_OK;
-    /* An even number, so that the last goes into the texture that is kept. */
-    const int fronts = (dims.x + dims.y + dims.z - 1) / 2 * 2;
-    for (int i = 0; i < fronts && result == BRUME_OK; ++i) {
-        glBindTextureUnit(SLOT_DEPTH_BEFORE, i % 2 ? other.id : texture->id);
-        bind_image(i % 2 ? texture : &other);
-        result = check_cancel(input);
-        if (result == BRUME_OK)
-            result =
-                set_pass(depths, (struct gpu_lattice_pass){.offset = {0, -1, 1, 0},
-                                                           .slab = {(int)depths->count, 0, 0, 0}});
-        if (result == BRUME_OK)
-            program_dispatch(program, dims.x, dims.y, dims.z * (int)depths->count);
+    TRY(program_compute(&input->gpu->programs, "opv_iterate", &program));
+    for (int i = 0; i < 2; ++i) {
+        TRY(texture_init(&input->gpu->memory, &textures[i], FOR_TRANSPORT, GL_TEXTURE_3D,
+                         GL_RGBA16F, texture_side(dims.x), texture_side(dims.y),
+                         texture_side(tiles * dims.z), 1, "depths to four lamps"));
+        glClearTexImage(textures[i].id, 0, GL_RGBA, GL_FLOAT, unreached);
+    }
+    const int fronts = dims.x + dims.y + dims.z - 2;
+    for (int i = 0; i < fronts; ++i) {
+        TRY(go_on(input, (size_t)i, (size_t)fronts));
+        glBindTextureUnit(SLOT_DEPTH_BEFORE, textures[i % 2].id);
+        bind_image(&textures[1 - i % 2]);
+        TRY(set_pass(depths, (struct gpu_lattice_pass){.offset = {count, -1, 0, 0}}));
+        program_dispatch(program, dims.x, dims.y, tiles * dims.z);
         glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     }
-    texture_finish(memory, &other);
+    glBindTextureUnit(SLOT_DEPTH_BEFORE, textures[fronts % 2].id);
+    bind_image(depths->texture);
+    for (int i = 0; i < count; ++i) {
+        TRY(set_pass(depths, (struct gpu_lattice_pass){.offset = {count, i, 0, 0}}));
+        program_dispatch(program, dims.x, dims.y, dims.z);
+    }
+    return BRUME_OK;
+}
+
+static brume_result iterate(struct depths *depths)
+{
+    struct texture textures[2] = {{0}};
+    const brume_result result = iterate_in(depths, textures);
+    for (int i = 0; i < 2; ++i)
+        texture_finish(&depths->input->gpu->memory, &textures[i]);
     return result;
 }
 
@@ -354,7 +368,7 @@ static brume_result run(const struct transport_input *input, struct texture *tex
     struct depths depths = {.input = input, .texture = texture, .sources = sources, .count = count};
     const brume_result result = ways[input->settings->depths](&depths);
     buffer_finish(&input->gpu->memory, &depths.block);
-    buffer_finish(&input->gpu->memory, &depths.bricks);
+    buffer_finish(&input->gpu->memory, &depths.groups);
     return result;
 }
 

@@ -9,11 +9,9 @@
  * shows. */
 uint32_t depths_samples(const struct gpu_light *light, float cell);
 
-/* Texels of the texture that holds the lamps' tiles are tau_size's; what depths_run needs beside it
- * for a while, in bytes. */
+/* What depths_run needs for a while beside the texture of the lamps' tiles, in bytes. */
 uint64_t depths_working_bytes(const brume_settings *settings, const struct gpu_light *lights,
-                              uint32_t count, const struct gpu_frame *frame,
-                              const int tau_size[3]);
+                              uint32_t count, const struct gpu_frame *frame);
 
 /* Fills the tiles of those lamps in transport->tau, which has its size. The frame's block and the
  * medium are bound. */

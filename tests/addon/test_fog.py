@@ -410,6 +410,63 @@ def test_numbers_of_grids_are_given():
     assert [builder.grid(name).number for name in ("b", "c", "a")] == [1, 2, 0]
 
 
+def _puff():
+    ob = add("Puff", None, scale=(2, 2, 2))
+    ob.empty_display_size = 0.25
+    return source(ob, radius=2.0)
+
+
+def _ball():
+    bpy.ops.object.metaball_add(radius=0.5)
+    return source(bpy.context.object, radius=2.0)
+
+
+def _point():
+    return source(dust(points=[(0, 0, -1)], location=(0, 0, 1)), 'POINTS')
+
+
+def _particle():
+    ob = emitter(count=1, end=1)
+    settings = ob.particle_systems[0].settings
+    settings.normal_factor = settings.effector_weights.gravity = 0.0
+    settings.emit_from, settings.use_emit_random, settings.distribution = 'VERT', False, 'JIT'
+    ob.show_instancer_for_render = False
+    made = source(ob, 'PARTICLES', radius=4.0)
+    simulate(bpy.context.scene, 2)
+    particle, = particles_of(ob)
+    ob.location = -particle.location  # the simulation begins anew
+    simulate(bpy.context.scene, 2)
+    return made
+
+
+@pytest.mark.parametrize("give", [_puff, _ball, _point, _particle])
+@pytest.mark.parametrize("shader", [False, True])
+def test_what_is_seen(scene, render, give, shader):
+    """Of a Gaussian of radius 1 m at the origin, what an orthographic camera sees adds up."""
+    camera = bpy.data.cameras.new("Camera")
+    camera.type, camera.ortho_scale = 'ORTHO', 4.0
+    scene.camera = add("Camera", camera, location=(0, -6, 0))
+    scene.camera.rotation_euler = (np.pi / 2, 0, 0)
+    scene.render.film_transparent, scene.brume.samples = True, 64
+    density = 0.05
+    give().density = density
+    if shader:
+        owner, nodes = material("Mist")
+        nodes.volume(nodes.node("VolumeScatter", Color=(1, 1, 1, 1), Density=nodes.node(
+            "VolumeInfo", outlet=1)))
+        for ob in bpy.data.objects:
+            for made in ob.brume.fog_sources:
+                made.material = owner
+    seen = render()[..., 3]
+    side = 4.0 / 32
+    # Its optical depth at x from its axis is density sqrt(pi) / a exp(-a^2 x^2), a = 2 / m.
+    x, z = np.meshgrid((np.arange(32) - 15.5) * side, (np.arange(24) - 11.5) * side)
+    wanted = 1 - np.exp(-density * np.pi ** 0.5 / 2 * np.exp(-4 * (x * x + z * z)))
+    assert seen.sum() == pytest.approx(wanted.sum(), rel=0.01)
+    # It changes by up to 21 % from pixel to pixel, and 64 samples are spread over one and a half.
+    np.testing.assert_allclose(seen, wanted, atol=0.05 * wanted.max())
+
+
 # ------------------------------------------------------------------------------------------------
 # Bad input
 

@@ -35,7 +35,7 @@ def numbers(ob, own, shown):
     is the object's, not what modifiers made beside it; shown: whether it is itself seen."""
     def applies(source):
         if source.source == 'POINTS':
-            return shown and (ob.type in {'MESH', 'POINTCLOUD'} or ob.type == 'EMPTY')
+            return shown and ob.type in {'MESH', 'POINTCLOUD', 'EMPTY'}
         return own and (shown or source.source == 'PARTICLES')
     return [number for number, source in enumerate(ob.brume.fog_sources)
             if source.enabled and applies(source)]
@@ -173,7 +173,7 @@ class _Reader:
                 f'Object "{self.ob.name}": {unusable.sum()} of its {count} points have no finite '
                 f"position, size and colour, or a negative size, and are left out.")
         # A radius of 0 or almost so, or no strength, is how fog begins and ends.
-        kept = ~unusable & np.isfinite(found[:, 3]) & (found[:, 3] > 0) & (found[:, 7] > 0)
+        kept = ~unusable & np.isfinite(found).all(1) & (found[:, 3] > 0) & (found[:, 7] > 0)
         return found[kept] if kept.any() else None
 
 

@@ -152,6 +152,8 @@ class _Export:
         light.export(self.target, ob, matrix, _path(instance), ob.visible_camera)
 
     def volume(self, instance, ob, matrix):
+        if ob.data is None:  # evaluated to nothing
+            return
         volume.export_volume_object(
             self.target, ob, matrix, key_of_datablock(ob, "volume", *_path(instance)),
             self.makers(instance, ob), self.override)

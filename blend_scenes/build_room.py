@@ -20,12 +20,7 @@ boards = staging.matt('Boards', (0.30, 0.19, 0.11))
 iron = staging.matt('Iron', (0.12, 0.13, 0.14))
 velvet = staging.matt('Velvet', (0.42, 0.06, 0.07))
 
-
-def slab(name, low, high, material):
-    staging.box(name, [b - a for a, b in zip(low, high)], [(a + b) / 2 for a, b in zip(low, high)],
-                material)
-
-
+slab = staging.slab
 x, y, top = WIDTH / 2, DEPTH / 2, HEIGHT
 slab('Floor', (-x - WALL, -y - WALL, -WALL), (x + WALL, y + WALL, 0), boards)
 slab('Ceiling', (-x - WALL, -y - WALL, top), (x + WALL, y + WALL, top + WALL), plaster)

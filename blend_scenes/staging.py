@@ -38,8 +38,9 @@ def save(name):
                                 relative_remap=True)
 
 
-def finish(name, samples=64, bounces=4):
-    """Sets both engines up, looks through the camera in every 3D view, and saves the file.
+def finish(name, samples=64, bounces=4, engine='BRUME'):
+    """Sets both engines up, looks through the camera in every 3D view, and saves the file with
+    `engine` chosen if it is there, else Cycles.
 
     Cycles gets single scattering (no volume bounces) without clamping or denoising: what Brume's
     single scattering is compared with.
@@ -61,8 +62,8 @@ def finish(name, samples=64, bounces=4):
     cycles.caustics_reflective = cycles.caustics_refractive = False
     cycles.volume_step_rate = 0.5
     cycles.volume_max_steps = 1024
-    if any(engine.bl_idname == 'BRUME' for engine in bpy.types.RenderEngine.__subclasses__()):
-        scene.render.engine = 'BRUME'
+    if any(kind.bl_idname == engine for kind in bpy.types.RenderEngine.__subclasses__()):
+        scene.render.engine = engine
     for screen in bpy.data.screens:
         for area in screen.areas:
             if area.type == 'VIEW_3D':
@@ -93,6 +94,22 @@ def box(name, size, location, material=None, bevel=0.0, rotation=0.0):
         modifier = thing.modifiers.new('Bevel', 'BEVEL')
         modifier.width, modifier.segments = bevel, 3
     return thing
+
+
+def slab(name, low, high, material):
+    """A box between two corners."""
+    return box(name, [b - a for a, b in zip(low, high)], [(a + b) / 2 for a, b in zip(low, high)],
+               material)
+
+
+def alcove(width, depth, height, rest, left, right, wall=0.2):
+    """A room without its front wall, which is at y = -depth / 2; its floor is at z = 0."""
+    x, y = width / 2, depth / 2
+    slab('Floor', (-x - wall, -y, -wall), (x + wall, y + wall, 0.0), rest)
+    slab('Ceiling', (-x - wall, -y, height), (x + wall, y + wall, height + wall), rest)
+    slab('Back', (-x, y, 0.0), (x, y + wall, height), rest)
+    slab('Left', (-x - wall, -y, 0.0), (-x, y + wall, height), left)
+    slab('Right', (x, -y, 0.0), (x + wall, y + wall, height), right)
 
 
 def sphere(name, radius, location, material=None):

@@ -29,6 +29,7 @@ class Case:
     groups: tuple = ()
     world_samples: int = 0  # Brume's; 0: the default
     passes: tuple = ()      # beyond Combined: of "Depth", "Normal", "Emit", "Env"
+    twin: bool = False      # Cycles renders SCENE_twin.blend, which looks the same to it
 
     @property
     def name(self):
@@ -39,9 +40,9 @@ class Case:
         if self.change:
             getattr(changes, self.change)(scene)
 
-    @property
-    def blend(self):
-        return os.path.join(SCENES, self.scene + '.blend')
+    def blend(self, engine):
+        twin = '_twin' if self.twin and engine == 'CYCLES' else ''
+        return os.path.join(SCENES, f'{self.scene}{twin}.blend')
 
 
 # Matt things agree as well as lamps and shadow maps do; glossy ones also differ by what stands for
@@ -60,6 +61,9 @@ CASES = {case.name: case for case in (
     Case('cube', (), 0.04, 512, zoom=1.4),
     Case('plume', (), 0.04, 512, zoom=1.6),
     Case('cloud', (), 0.04, 512, zoom=1.15),
+    Case('fog_one', (), 0.04, 256, twin=True),
+    Case('fog_sixteen', (), 0.04, 256, twin=True),
+    Case('fog_lights', (), 0.04, 768, twin=True),
     Case('surfaces', (), 0.03, 512, size=256, groups=GROUPS),
     Case('surfaces', (), 0.03, 256, size=256, change='passes', groups=GROUPS,
          passes=('Depth', 'Normal', 'Emit', 'Env')),

@@ -47,7 +47,8 @@ def digest(case):
         found.update(repr((bool(case.groups), case.passes)).encode())
     data = sorted(glob.glob(os.path.join(SCENES, case.scene + '.[eh][xd]r')))
     data += sorted(glob.glob(os.path.join(SCENES, case.scene + '_cache', '*', '*')))
-    for path in [case.blend, os.path.join(SCENES, case.scene + '.vdb'), *data]:
+    blend = case.blend('CYCLES')
+    for path in [blend, os.path.splitext(blend)[0] + '.vdb', *data]:
         if os.path.exists(path):
             with open(path, 'rb') as file:
                 found.update(file.read())
@@ -78,7 +79,7 @@ def load(case):
     with np.load(path_of(case)) as file:
         if str(file['digest']) != digest(case):
             raise RuntimeError(f'{path_of(case)} was made from other files or settings than '
-                               f'{case.scene}.blend has now: run pytest tests/pictures --refresh')
+                               f'{case.name} has now: run pytest tests/pictures --refresh')
         passes = {name: file[name].astype(np.float32) for name in file
                   if name not in {'digest', 'apart'}}
         return passes, float(file['apart'])

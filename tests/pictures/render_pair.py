@@ -90,7 +90,7 @@ def main(arguments):
     options = parser.parse_args(arguments)
     for name in options.cases:
         case = CASES[name]
-        bpy.ops.wm.open_mainfile(filepath=case.blend, load_ui=False)
+        bpy.ops.wm.open_mainfile(filepath=case.blend(options.engine), load_ui=False)
         scene = bpy.context.scene
         set_up(scene, case)
         if options.engine == 'CYCLES':

@@ -139,6 +139,10 @@ WAYS = {'PROPAGATED': 'Brume: from brick to brick', 'MARCHED': 'each node marche
         'ITERATED': 'as published: all nodes in all iterations'}
 
 
+def lights_of(count):
+    return f'{count} light' + ('s' if count != '1' else '')
+
+
 def opv_page(lines):
     line = lines[-1]
     width, height = line['resolution']
@@ -148,7 +152,7 @@ def opv_page(lines):
     yield 'Frames a second; in brackets the propagation in them, ms (the paper\'s Table 2):'
     yield ''
     columns = next(iter(line['table_2'].values()))
-    yield row('cells', *(f'{name} lights' if name.isdigit() else '1 light, static'
+    yield row('cells', *(lights_of(name) if name.isdigit() else '1 light, static'
                          for name in columns))
     yield row('---', *['---:'] * len(columns))
     for size, cells in line['table_2'].items():
@@ -166,7 +170,7 @@ def opv_page(lines):
     yield ''
     yield 'Propagation at 40³, ms:'
     yield ''
-    yield row('', *(f'{lights} lights' for lights in next(iter(line['ways'].values()))))
+    yield row('', *map(lights_of, next(iter(line['ways'].values()))))
     yield row('---', *['---:'] * len(next(iter(line['ways'].values()))))
     for way, cells in line['ways'].items():
         yield row(WAYS[way], *(f'{cell["propagation_ms"]:.1f}' for cell in cells.values()))

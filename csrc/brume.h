@@ -254,7 +254,7 @@ typedef struct brume_volume_program {
 
 /* One term of a medium that is a sum of Gaussians: amplitude * exp(-scale^2 |x - center|^2) at x in
  * object space. It stays round under any transform, which scales it by the cube root of its
- * determinant. Beyond 3 / scale of its centre it counts as 0. */
+ * determinant. Cells that are nowhere within 3 / scale of its centre do without it. */
 typedef struct brume_gaussian {
     float center[3];
     float scale;                     /* above 0 */

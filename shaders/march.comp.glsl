@@ -43,7 +43,7 @@ float mean_inverse_square(float t0, float t1, float h)
 
 // The distance from the ray that mean_inverse_square wants, and in `along` the point's place on the
 // ray. The light of a point or spot is that of a disk that faces whom it lights, as in Cycles:
-// 2 (1 - d / sqrt(d^2 + r^2)) / r^2 instead of 1/d^2, which is 1 / (d^2 + 0.7 r^2) within 6 % from
+// 2 (1 - d / sqrt(d^2 + r^2)) / r^2 instead of 1/d^2, which is 1 / (d^2 + 0.7 r^2) within 5 % from
 // d = r / 2 on. Samples strewn over the lamp would each have a bright core of their own.
 float nearest_approach(gpu_light light, gpu_light_sample s, view_ray ray, out float along)
 {

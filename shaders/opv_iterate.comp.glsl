@@ -8,7 +8,9 @@ layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GR
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
-    gpu_lattice_pass stage; // offset.x: sources; y: source to take out of the result, -1: iterate
+    // offset.x: one after the last source; y: source to take out of the result, -1: iterate; z: the
+    // first source
+    gpu_lattice_pass stage;
 };
 
 layout(binding = SLOT_DEPTH_BEFORE) uniform sampler3D depth_before; // below 0: not reached yet
@@ -43,8 +45,8 @@ vec4 before_at(ivec3 node, int tile)
 
 void iterate(ivec3 node)
 {
-    int first = 4 * (node.z / frame.lattice_dims.z);
-    int tile = first / 4 * frame.lattice_dims.z;
+    int tile = node.z / frame.lattice_dims.z * frame.lattice_dims.z;
+    int first = stage.offset.z + 4 * (node.z / frame.lattice_dims.z);
     node.z -= tile;
     if (first >= stage.offset.x || any(greaterThanEqual(node, frame.lattice_dims.xyz)))
         return;
@@ -78,7 +80,8 @@ void main()
     gpu_depth_source source = sources[number];
     vec3 p = node_position(node);
     light_way way = way_to(source, p);
-    float tau = max(before_at(node, number / 4 * frame.lattice_dims.z)[number % 4], 0.0);
+    int place = number - stage.offset.z;
+    float tau = max(before_at(node, place / 4 * frame.lattice_dims.z)[place % 4], 0.0);
     // The first cell has a depth at no distance.
     float way_length = max(way.to - way.from, frame.lattice_lower.w);
     imageStore(depth_image, node + source.tile.xyz, depth_texel(vec3(tau), way_length, p));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Optical depth T(X, S) from every node of the lattice to a source (OPV, eq. 4), by a march all the
-// way through the medium: the reference for opv_propagate.
+// way through the medium: the reference for opv_propagate. Kept as lib/depth.glsl says.
 #version 450 core
 #include "lib/depth.glsl"
 

@@ -20,7 +20,7 @@ void main()
         return;
     vec3 p = node_position(node);
     int count = stage.offset.y;
-    vec3 depths[8];
+    vec3 depths[EXTENDED_SAMPLES];
     vec3 least = vec3(1e30); // keeps the sum from underflow
     for (int i = 0; i < count; ++i) {
         gpu_depth_source s = sources[stage.offset.x + 1 + i];

@@ -34,10 +34,11 @@ float way_to_nearer_bricks(ivec3 steps, vec3 towards)
     return min(way.x, min(way.y, way.z));
 }
 
-vec3 before_at(gpu_depth_source source, ivec3 node, vec3 p)
+vec3 before_at(gpu_depth_source source, ivec3 node, vec3 way)
 {
-    // In nodes; along an axis across the way no further from the light than the node itself.
-    vec3 at = (p - frame.lattice_lower.xyz) / frame.lattice_lower.w;
+    // In nodes, from the node: the world's coordinates have no digits left far from its origin. Along
+    // an axis across the way no further from the light than the node itself.
+    vec3 at = vec3(node) + way / frame.lattice_lower.w;
     vec3 side = mix(vec3(-1.0), vec3(1.0), greaterThan(node, source.node.xyz));
     at = vec3(node) - side * max(side * (vec3(node) - at), vec3(CLEAR));
     at = clamp(at, vec3(CLEAR), vec3(frame.lattice_dims.xyz - 1) - CLEAR);
@@ -75,6 +76,6 @@ void main()
     float end = min(way_to_nearer_bricks(steps, way.towards), way.to);
     vec3 tau = short_tau(p, way.towards, way.from, end);
     if (end < way.to)
-        tau += before_at(source, node, p + way.towards * end) * (way.to - max(end, way.from));
+        tau += before_at(source, node, way.towards * end) * (way.to - max(end, way.from));
     imageStore(depth_image, node + source.tile.xyz, depth_texel(tau, way.to - way.from, p));
 }

@@ -22,6 +22,8 @@ _THEMSELVES = {'EMPTY', 'META'}
 
 CURVES = ("Radius", "Strength")
 
+_OVERRIDE = {'LIBRARY_OVERRIDABLE'}
+
 
 def _changed(source, context):
     """Nothing; but Blender evaluates an object anew after a script set a property only if the
@@ -46,12 +48,12 @@ def _system_names(source, context, text):
 
 class BrumeFogSource(bpy.types.PropertyGroup):
     name: StringProperty(
-        name="Name", default="Fog", update=_changed)
+        name="Name", default="Fog", update=_changed, override=_OVERRIDE)
     enabled: BoolProperty(
-        name="Enabled", default=True, update=_changed,
+        name="Enabled", default=True, update=_changed, override=_OVERRIDE,
         description="Lets this source give fog in the viewport and in renders")
     source: EnumProperty(
-        name="Source", default='OBJECT', update=_changed,
+        name="Source", default='OBJECT', update=_changed, override=_OVERRIDE,
         description="What the fog sits on. Time and memory grow with the number of Gaussians, and "
                     "with the space that each fills",
         items=[('OBJECT', "Object", "An empty is one ball of fog as large as it is displayed; "
@@ -61,43 +63,47 @@ class BrumeFogSource(bpy.types.PropertyGroup):
                ('PARTICLES', "Particles", "Each living particle of a particle system is a ball of "
                                           "fog as large as its size", 2)])
     particle_system: StringProperty(
-        name="Particle System", update=_changed, search=_system_names,
+        name="Particle System", update=_changed, override=_OVERRIDE, search=_system_names,
         search_options={'SUGGESTION'},
-        description="The particle system; empty: the active one")
+        description="The particle system; empty: the first that is no hair")
     radius: FloatProperty(
         name="Radius", default=1.0, min=0.0, soft_max=10.0, precision=3, update=_changed,
+        override=_OVERRIDE,
         description="Multiplies the size of each ball of fog: that of a particle, the radius of a "
                     "point (1 m if it has none) or of a metaball, the display size of an empty. "
                     "There 2 % of the density in its middle is left. Small ones in a large scene "
                     "need more Volume Resolution; large ones that overlap take more time")
     density: FloatProperty(
         name="Density", default=1.0, min=0.0, soft_max=10.0, precision=3, update=_changed,
+        override=_OVERRIDE,
         description="Density in the middle of each ball of fog, per metre. Where they overlap it "
                     "adds up")
     color: FloatVectorProperty(
-        name="Color", subtype='COLOR', default=(0.8, 0.8, 0.8), min=0.0, max=1.0, update=_changed,
+        name="Color", subtype='COLOR', default=(0.8, 0.8, 0.8), min=0.0, max=1.0,
+        update=_changed, override=_OVERRIDE,
         description="Share of the light that the fog scatters; it absorbs the rest. Where balls "
                     "of fog overlap, the denser one's color counts more")
     color_attribute: StringProperty(
-        name="Color Attribute", update=_changed, search=_color_names,
+        name="Color Attribute", update=_changed, override=_OVERRIDE, search=_color_names,
         search_options={'SUGGESTION'},
         description="Color attribute of the points that multiplies the color; colors of face "
                     "corners are averaged. Geometry nodes may make it. Empty: none")
     factor_attribute: StringProperty(
-        name="Factor", update=_changed, search=_attribute_names, search_options={'SUGGESTION'},
+        name="Factor", update=_changed, override=_OVERRIDE,
+        search=_attribute_names, search_options={'SUGGESTION'},
         description="Attribute or vertex group of the points, from 0 to 1, along which the curves "
                     "change radius and strength. A vertex group of a large mesh takes its time to "
                     "read. Empty: the curves are not used")
     material: PointerProperty(
-        name="Material", type=bpy.types.Material, update=_changed,
+        name="Material", type=bpy.types.Material, update=_changed, override=_OVERRIDE,
         description="Material whose Volume output the fog has; its Attribute nodes read "
                     "\"density\" and \"color\". Empty: plain fog of the color above")
     anisotropy: FloatProperty(
-        name="Anisotropy", default=0.0, min=-0.99, max=0.99, update=_changed,
+        name="Anisotropy", default=0.0, min=-0.99, max=0.99, update=_changed, override=_OVERRIDE,
         description="Where plain fog scatters light to: above 0 onwards, as mist does, so that it "
                     "glows around lights; below 0 back to where it came from")
     curves: PointerProperty(
-        name="Curves", type=bpy.types.NodeTree, update=_changed,
+        name="Curves", type=bpy.types.NodeTree, update=_changed, override=_OVERRIDE,
         poll=lambda source, tree: is_curves(tree),
         description="Curves that multiply radius and strength of each ball of fog: along the life "
                     "of a particle, from birth to death, or the factor of a point. Other sources "
@@ -105,8 +111,9 @@ class BrumeFogSource(bpy.types.PropertyGroup):
 
 
 class BrumeObjectSettings(bpy.types.PropertyGroup):
-    fog_sources: CollectionProperty(type=BrumeFogSource, name="Fog Sources")
-    fog_active: IntProperty(name="Active Fog Source", options=set())
+    fog_sources: CollectionProperty(type=BrumeFogSource, name="Fog Sources",
+                                    override={*_OVERRIDE, 'USE_INSERTION'})
+    fog_active: IntProperty(name="Active Fog Source", options=set(), override=_OVERRIDE)
 
 
 def is_curves(tree):
@@ -304,7 +311,7 @@ _CLASSES = (BrumeFogSource, BrumeObjectSettings, BRUME_OT_fog_add, BRUME_OT_fog_
 def register():
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Object.brume = PointerProperty(type=BrumeObjectSettings)
+    bpy.types.Object.brume = PointerProperty(type=BrumeObjectSettings, override=_OVERRIDE)
 
 
 def unregister():

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#define NODE_BYTES 8      /* optical depth of one light: four halves */
+#define NODE_BYTES 8      /* of one light: four halves */
 #define SKY_NODE_BYTES 24 /* three times four halves */
 
 struct box {
@@ -184,7 +184,8 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
                 pack(medium->lower, nodes_of(&box, resolution, &frame->lattice_dims));
             if (layout_tiles(renderer, gpu->context.info.max_texture_3d) &&
                 tau_bytes(renderer) + depths_working_bytes(settings, renderer->shadows.lights,
-                                                           renderer->shadows.light_count, frame) <=
+                                                           renderer->shadows.light_count, frame,
+                                                           gpu->context.info.max_texture_3d) <=
                     renderer->shares.depth)
                 break;
             if (resolution == 1)

@@ -341,6 +341,11 @@ static void add_gaussian_plane(struct build *build, const struct share *share,
     }
 }
 
+static bool is_stopped(void *build)
+{
+    return stopped(build);
+}
+
 static brume_result add_gaussians(struct build *build, struct share *share)
 {
     const struct volume *volume = share->volume;
@@ -349,7 +354,7 @@ static brume_result add_gaussians(struct build *build, struct share *share)
     for (int axis = 0; axis < 3; ++axis)
         lower[axis] = build->lattice->lower[axis] + share->first[axis] * cell;
     TRY(splats_init(&share->splats, volume->gaussians, volume->gaussian_count,
-                    volume->world_from_object, lower, cell, share->dims));
+                    volume->world_from_object, lower, cell, share->dims, is_stopped, build));
     const size_t width = (size_t)share->dims[0];
     bool memory = true;
 #pragma omp parallel reduction(&& : memory)

@@ -92,7 +92,7 @@ static bool sort_by_plane(struct splats *splats, uint32_t count)
 
 brume_result splats_init(struct splats *splats, const brume_gaussian *gaussians, uint32_t count,
                          const float world_from_object[16], const double lower[3], double cell,
-                         const int32_t dims[3])
+                         const int32_t dims[3], bool (*stopped)(void *user), void *user)
 {
     struct splats made = {0};
     memcpy(made.dims, dims, sizeof made.dims);
@@ -112,6 +112,8 @@ brume_result splats_init(struct splats *splats, const brume_gaussian *gaussians,
     }
 #pragma omp parallel for schedule(dynamic, 64)
     for (uint32_t s = 0; s < count; ++s) {
+        if (stopped(user))
+            continue;
         float *along = made.weights + made.splats[s].weights;
         for (int axis = 0; axis < 3; along += made.splats[s].count[axis++])
             weigh(&made.splats[s], axis, along);

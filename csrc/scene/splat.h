@@ -7,6 +7,7 @@
 
 #include "brume.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /* Beyond so many widths (1 / scale) of its centre a Gaussian counts as 0: 1.2e-4 of its peak is
@@ -34,10 +35,11 @@ struct splats {
 };
 
 /* Cell (i, j, k) is the world's cube of side `cell` from lower + (i, j, k) * cell. The lattice
- * holds the Gaussians' reach, up to rounding. */
+ * holds the Gaussians' reach, up to rounding. stopped: polled; once true, the weights stay undefined
+ * and the caller ends. */
 brume_result splats_init(struct splats *splats, const brume_gaussian *gaussians, uint32_t count,
                          const float world_from_object[16], const double lower[3], double cell,
-                         const int32_t dims[3]);
+                         const int32_t dims[3], bool (*stopped)(void *user), void *user);
 void splats_finish(struct splats *splats); /* zeroed is fine */
 
 /* How many Gaussians plane k has. */

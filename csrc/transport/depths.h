@@ -11,7 +11,7 @@ uint32_t depths_samples(const struct gpu_light *light, float cell);
 
 /* What depths_run needs for a while beside the texture of the lamps' tiles, in bytes. */
 uint64_t depths_working_bytes(const brume_settings *settings, const struct gpu_light *lights,
-                              uint32_t count, const struct gpu_frame *frame);
+                              uint32_t count, const struct gpu_frame *frame, int texture_limit);
 
 /* Fills the tiles of those lamps in transport->tau, which has its size. The frame's block and the
  * medium are bound. */

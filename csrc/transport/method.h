@@ -12,7 +12,7 @@
 
 /* What the view takes light from. */
 struct transport {
-    struct texture tau;    /* optical depth to each light, a tile a light */
+    struct texture tau;    /* optical depth to each light over the length of the way, a tile a light */
     struct texture sky[3]; /* the world's light, spherical harmonics a colour */
     /* Signatures of what a light's tile and the sky hold, 0: nothing of use. */
     uint64_t *tau_signatures, sky_signature;

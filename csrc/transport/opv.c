@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* OPV: single scattering through one optical depth a cell and light. "Real-time single scattering
- * in heterogeneous media by opacity propagation volumes"; docs/methods/opv.md. The depths (its
- * equation 4) are marched exactly for now; the world's light goes into a lattice of its own. */
+/* OPV: single scattering through one optical depth a node and light. "Real-time single scattering
+ * in heterogeneous media by opacity propagation volumes"; docs/methods/opv.md. The world's light
+ * goes into a lattice of its own. */
 #include "base/hash.h"
 #include "base/result.h"
 #include "transport/depths.h"
@@ -80,24 +80,14 @@ static brume_result compare_tiles(struct transport *transport, const struct tran
     return BRUME_OK;
 }
 
-/* Half floats that nobody wrote may be NaN, which no weight of 0 makes harmless. */
-static brume_result ensure_tau(struct transport *transport, const struct transport_input *input)
-{
-    const GLuint before = transport->tau.id;
-    TRY(texture_ensure(&input->gpu->memory, &transport->tau, FOR_TRANSPORT, GL_TEXTURE_3D,
-                       GL_RGBA16F, input->tau_size[0], input->tau_size[1], input->tau_size[2], 1,
-                       "optical depths"));
-    if (transport->tau.id != before)
-        glClearTexImage(transport->tau.id, 0, GL_RGBA, GL_FLOAT, NULL);
-    return BRUME_OK;
-}
-
 static brume_result run_tau(struct transport *transport, const struct transport_input *input)
 {
     uint64_t *wanted = NULL;
     uint32_t count = 0;
     TRY(compare_tiles(transport, input, &wanted));
-    TRY(ensure_tau(transport, input));
+    TRY(texture_ensure(&input->gpu->memory, &transport->tau, FOR_TRANSPORT, GL_TEXTURE_3D,
+                       GL_RGBA16F, input->tau_size[0], input->tau_size[1], input->tau_size[2], 1,
+                       "optical depths"));
     uint32_t *changed = malloc((input->light_count + 1) * sizeof *changed);
     if (!changed)
         return fail(BRUME_E_MEMORY, "no memory for %u lights", input->light_count);

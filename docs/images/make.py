@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the user guide's pictures: scenes rendered by Brume, and its panels in Blender's window.
 
-    docs/images/make.py [NAME]...      all, or some of: room cloud fog_lights fog_sixteen panels viewport
+    docs/images/make.py [NAME]...    all, or some: room cloud fog_lights fog_sixteen panels viewport
 
 Needs what scripts/setup installs, and a built library; a virtual display is its own.
 """

@@ -68,6 +68,9 @@ typedef struct mat4 { float m[16]; } mat4;
 /* Nodes along a brick's side: the unit of propagation, of whole groups. */
 #define BRICK_NODES 8
 
+/* Samples of a lamp with extent whose transmittances are averaged, two by two in a texture. */
+#define EXTENDED_SAMPLES 4
+
 /* Lights, numbered as brume_light_type of brume.h; the world is one more. */
 #define LIGHT_SUN 0
 #define LIGHT_POINT 1
@@ -143,7 +146,7 @@ struct gpu_draw {
 /* The lattice stages' block. */
 struct gpu_lattice_pass {
     ivec4 offset;        /* what a stage's shader says */
-    ivec4 slab;          /* z, w: first node layer of this dispatch, and one after its last */
+    ivec4 slab;          /* z, w: first node layer of this dispatch, one after its last; x, y unused */
 };
 
 /* A point of a lamp, or a direction towards one, that optical depths are found to. */
@@ -151,7 +154,7 @@ struct gpu_depth_source {
     vec4 point;          /* w: 1 for the unit vector towards a sun */
     ivec4 node;          /* where the light comes from: first node of its cell, or beyond the lattice's
                             end; the paper's gather: the nearest node */
-    ivec4 tile;          /* y, z: where its lattice begins in the texture */
+    ivec4 tile;          /* y, z: where its lattice begins in the texture; x: 0 */
 };
 
 /* Passes as brume_pass of brume.h. */

@@ -128,7 +128,9 @@ def test_metaballs_are_fog_instead_of_a_surface(scene, export, target):
     made.enabled, ball.use_negative = True, True
     bpy.context.view_layer.update()
     assert len(gaussians(export())) == 1
-    assert target.reports.ids() == ["UNSUPPORTED"]
+    negative, other = sorted(sentences(target))
+    assert "negative" in negative
+    assert '"Mball.001"' in other and "family" in other
 
 
 def test_vertices(scene, export):
@@ -689,6 +691,23 @@ def test_append(scene, tmp_path):
     made, = wanted.objects
     tree = made.brume.fog_sources[0].curves
     assert tree.nodes["Radius"].mapping.curves[0].points[0].location.y == 0.5
+
+
+def test_library_override(scene, tmp_path):
+    source(add("Puff", None), radius=2.0)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "puff.blend"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "puff.blend"), link=True) as (found, wanted):
+        wanted.objects = ["Puff"]
+    bpy.context.scene.collection.objects.link(wanted.objects[0])
+    ob = wanted.objects[0].override_create(remap_local_usages=True)
+    with bpy.context.temp_override(object=ob):
+        assert bpy.ops.brume.fog_add() == {'FINISHED'}
+    ob.brume.fog_sources[0].radius, ob.brume.fog_sources[1].density = 3.0, 7.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    ob = next(ob for ob in bpy.data.objects if ob.override_library)
+    assert [(s.radius, s.density) for s in ob.brume.fog_sources] == [(3.0, 1.0), (1.0, 7.0)]
 
 
 # ------------------------------------------------------------------------------------------------

@@ -10,8 +10,10 @@
 static const float origin[3];
 static const float down[3] = {0, 0, -1};
 
-static const brume_settings settings = {.medium_resolution = 32, .lattice_resolution = 32,
-                                        .shadow_resolution = 256, .light_samples = 64,
+static const brume_settings settings = {.medium_resolution = 32,
+                                        .lattice_resolution = 32,
+                                        .shadow_resolution = 256,
+                                        .light_samples = 64,
                                         .world_samples = 256};
 
 /* --- On a plate --------------------------------------------------------------------------- */
@@ -124,10 +126,13 @@ static void shut_in(void **state)
     float positions[24];
     uint32_t triangles[36];
     cube_mesh(place, 0.2f, positions, triangles);
-    const brume_mesh box = {.name = "box", .positions = positions, .triangles = triangles,
-                            .vertex_count = 8, .triangle_count = 12};
-    const brume_instances instances = {.world_from_object = identity, .mesh = 2, .count = 1,
-                                       .visibility = BRUME_VISIBLE_SHADOW};
+    const brume_mesh box = {.name = "box",
+                            .positions = positions,
+                            .triangles = triangles,
+                            .vertex_count = 8,
+                            .triangle_count = 12};
+    const brume_instances instances = {
+        .world_from_object = identity, .mesh = 2, .count = 1, .visibility = BRUME_VISIBLE_SHADOW};
     for (int i = 0; i < 6; ++i) {
         brume_scene *scene;
         assert_ok(brume_scene_create(device, &scene));
@@ -200,8 +205,7 @@ static double quadrature(const struct airlight *a, int channel)
         if (a->spot_angle > 0.0f) /* it shines down, with Cycles' cosine */
             intensity *= v[2] > cos(0.5 * a->spot_angle) ? v[2] : 0.0;
         const double cosine = v[0]; /* the light goes along -v, the eye's way is -X */
-        const double phase =
-            (1.0 - g * g) / (4.0 * PI * pow(1.0 + g * g - 2.0 * g * cosine, 1.5));
+        const double phase = (1.0 - g * g) / (4.0 * PI * pow(1.0 + g * g - 2.0 * g * cosine, 1.5));
         sum += sigma_s * phase * intensity / square *
                exp(-sigma_t * (inside(p, v, distance) + p[0] + 1.0)) * 2.0 / STEPS;
     }
@@ -211,8 +215,14 @@ static double quadrature(const struct airlight *a, int channel)
 static void airlight_of_lamps(void **state)
 {
     (void)state;
-#define THIN {.sigma_s = {0.05f, 0.05f, 0.05f}}
-#define TINTED {.sigma_s = {0.05f, 0.5f, 1.0f}, .sigma_a = {0.2f, 0.1f, 0}, .g = 0.5f}
+#define THIN                               \
+    {                                      \
+        .sigma_s = { 0.05f, 0.05f, 0.05f } \
+    }
+#define TINTED                                                                \
+    {                                                                         \
+        .sigma_s = {0.05f, 0.5f, 1.0f}, .sigma_a = {0.2f, 0.1f, 0}, .g = 0.5f \
+    }
     static const struct airlight cases[] = {
         {"far from the ray, on a node", {0, 0, 0}, 0.5f, 0, THIN, 0},
         {"near the ray, on a node", {0, 0, 0}, 0.1f, 0, THIN, 0},
@@ -236,8 +246,8 @@ static void airlight_of_lamps(void **state)
             lamp.spot_angle = a->spot_angle;
         }
         assert_ok(brume_scene_set_light(scene, 1, &lamp));
-        brume_view view = orthographic_view((float[3]){0, a->y, a->z}, (float[3]){1, 0, 0}, 1e-4f,
-                                            3.0f, 8);
+        brume_view view =
+            orthographic_view((float[3]){0, a->y, a->z}, (float[3]){1, 0, 0}, 1e-4f, 3.0f, 8);
         view.samples = 32;
         view.passes = 1u << BRUME_PASS_VOLUME_DIRECT;
         brume_job *job = render(scene, &settings, &view);
@@ -288,13 +298,63 @@ static void volume_factor(void **state)
     assert_close(values[1], 0.5 * values[2], 1e-5);
 }
 
+/* Light that starts within a solid does not leave it, and nothing else does either. */
+static void lamp_in_a_solid(void **state)
+{
+    (void)state;
+    const struct coefficients fog = {.sigma_s = {1, 1, 1}};
+    const brume_material grey = {.diffuse = {0.5f, 0.5f, 0.5f}, .roughness = 1, .alpha = 1};
+    const uint64_t materials[1] = {1};
+    float positions[24];
+    uint32_t triangles[36];
+    cube_mesh(origin, 0.3f, positions, triangles);
+    const brume_mesh cube = {.name = "solid",
+                             .positions = positions,
+                             .triangles = triangles,
+                             .materials = materials,
+                             .vertex_count = 8,
+                             .triangle_count = 12,
+                             .material_count = 1};
+    const brume_instances one = {.world_from_object = identity,
+                                 .mesh = 1,
+                                 .count = 1,
+                                 .visibility = BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW};
+    const brume_light lamp = point_lamp(origin, 100.0f);
+    brume_view view = orthographic_view(origin, (float[3]){0.2f, 0.3f, -1}, 2.0f, 5.0f, 32);
+    double bright[2];
+    for (int with_solid = 0; with_solid < 2; ++with_solid) {
+        brume_scene *scene;
+        assert_ok(brume_scene_create(device, &scene));
+        add_fog_cube(scene, 1, origin, 1.0f, &fog);
+        assert_ok(brume_scene_set_light(scene, 1, &lamp));
+        assert_ok(brume_scene_set_material(scene, 1, &grey));
+        assert_ok(brume_scene_set_mesh(scene, 1, &cube));
+        if (with_solid)
+            assert_ok(brume_scene_set_instances(scene, 1, &one));
+        brume_job *job = render(scene, NULL, &view);
+        float *pixels = read_pass(job, &view, BRUME_PASS_COMBINED);
+        bright[with_solid] = 0.0;
+        for (int i = 0; i < 32 * 32; ++i) {
+            assert_true(isfinite(pixels[4 * i]) && pixels[4 * i] >= 0.0f);
+            bright[with_solid] += pixels[4 * i];
+        }
+        free(pixels);
+        brume_job_release(job);
+        brume_scene_destroy(scene);
+    }
+    assert_true(bright[0] > 100.0);
+    /* What a shadow map's bias leaves of the fog that touches the solid. */
+    assert_true(bright[1] < 0.005 * bright[0]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sun_on_plate),   cmocka_unit_test(point_on_plate),
-        cmocka_unit_test(spot_on_plate),  cmocka_unit_test(area_on_plate),
-        cmocka_unit_test(world_on_plate), cmocka_unit_test(shut_in),
-        cmocka_unit_test(airlight_of_lamps), cmocka_unit_test(volume_factor),
+        cmocka_unit_test(lamp_in_a_solid), cmocka_unit_test(sun_on_plate),
+        cmocka_unit_test(point_on_plate),  cmocka_unit_test(spot_on_plate),
+        cmocka_unit_test(area_on_plate),   cmocka_unit_test(world_on_plate),
+        cmocka_unit_test(shut_in),         cmocka_unit_test(airlight_of_lamps),
+        cmocka_unit_test(volume_factor),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

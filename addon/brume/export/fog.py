@@ -75,6 +75,8 @@ class _Reader:
             elements = [e for e in ob.data.elements if not e.hide]
             if any(element.use_negative for element in elements):
                 self.unsupported("its negative metaballs take no fog away.")
+            if any(element.type != 'BALL' for element in elements):
+                self.unsupported("its metaballs of other shapes are balls of fog, too.")
             kept = [element for element in elements if not element.use_negative]
             return _Points(np.array([tuple(e.co) for e in kept]).reshape(-1, 3),
                            np.array([e.radius for e in kept]))
@@ -125,7 +127,9 @@ class _Reader:
 
     def particles(self):
         systems, name = self.ob.particle_systems, self.source.particle_system
-        system = systems.get(name) if name else systems.active or next(iter(systems), None)
+        # Without a name the first that can be fog, else the first, which is then reported.
+        system = systems.get(name) if name else min(
+            systems, key=lambda system: system.settings.type == 'HAIR', default=None)
         if system is None:
             named = f' "{name}"' if name else ""
             self.target.reports.warn("PARTICLES_UNKNOWN",

@@ -203,8 +203,14 @@ class _Export:
     def fog_families(self):
         """Names of the families of metaballs that are fog instead of a surface."""
         if self.families is None:
-            self.families = {_family(ob) for ob in self.depsgraph.objects
-                             if ob.type == 'META' and fog.is_fog(ob, 'OBJECT')}
+            seen = [ob for ob in self.depsgraph.objects if ob.type == 'META' and not (
+                self.space and not ob.visible_in_viewport_get(self.space))]
+            self.families = {_family(ob) for ob in seen if fog.is_fog(ob, 'OBJECT')}
+            for ob in seen:
+                if _family(ob) in self.families and not fog.is_fog(ob, 'OBJECT'):
+                    self.target.reports.unsupported(
+                        f'Object "{ob.name}"', "its metaballs are shown neither as a surface nor "
+                                               "as fog, since others of their family are fog.")
         return self.families
 
     def medium(self, instance, ob, matrix, shape, medium, reads):

@@ -336,12 +336,14 @@ static void lamps_in_odd_places(void **state)
     brume_scene_destroy(scene);
 }
 
-/* Lattices of few nodes along one axis or two: a row of five boxes of different density. */
+/* Lattices of few nodes along one axis or two: a row of five boxes of different density. The rod is
+ * half as thick as a cell, and light from beside it is in it for less than a cell. */
 static void thin_media(void **state)
 {
     (void)state;
     static const float sizes[4][3] = {
         {1, 1, 0.01f}, {0.01f, 1, 1}, {1, 0.01f, 0.01f}, {1, 1, 0.3f}};
+    static const double limits[4] = {0.03, 0.03, 0.06, 0.03};
     for (int shape = 0; shape < 4; ++shape) {
         brume_scene *scene;
         assert_ok(brume_scene_create(device, &scene));
@@ -367,7 +369,8 @@ static void thin_media(void **state)
             assert_ok(brume_scene_set_volume(scene, (uint64_t)box + 1, &volume));
         }
         set_lamps(scene, 0, origin);
-        assert_as_marched(scene, (brume_settings){.lattice_resolution = 50}, 3 + PLACES, 0.03);
+        assert_as_marched(scene, (brume_settings){.lattice_resolution = 50}, 3 + PLACES,
+                          limits[shape]);
         brume_scene_destroy(scene);
     }
 }

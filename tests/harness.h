@@ -90,22 +90,51 @@ static void constant_program(const struct coefficients *c, brume_instruction out
                                       .g = 3};
 }
 
-/* A homogeneous cube of medium. */
-static void add_fog_cube(brume_scene *scene, uint64_t key, const float center[3], float half,
-                         const struct coefficients *c)
-{
+/* A homogeneous cube of medium, as a volume and all that it points to. */
+struct fog_cube {
     float positions[24];
     uint32_t triangles[36];
     brume_instruction instructions[4];
-    brume_volume volume = {.name = "fog cube",
-                           .positions = positions,
-                           .triangles = triangles,
-                           .vertex_count = 8,
-                           .triangle_count = 12};
+    brume_volume volume;
+};
+
+static void fog_cube_init(struct fog_cube *cube, const float center[3], float half,
+                          const struct coefficients *c)
+{
+    cube->volume = (brume_volume){.name = "fog cube",
+                                  .positions = cube->positions,
+                                  .triangles = cube->triangles,
+                                  .vertex_count = 8,
+                                  .triangle_count = 12};
+    cube_mesh(center, half, cube->positions, cube->triangles);
+    constant_program(c, cube->instructions, &cube->volume.program);
+    memcpy(cube->volume.world_from_object, identity, sizeof identity);
+}
+
+static void add_fog_cube(brume_scene *scene, uint64_t key, const float center[3], float half,
+                         const struct coefficients *c)
+{
+    struct fog_cube cube;
+    fog_cube_init(&cube, center, half, c);
+    assert_ok(brume_scene_set_volume(scene, key, &cube.volume));
+}
+
+/* A solid cube without a material: mesh and instances of the key. */
+static void add_cube(brume_scene *scene, uint64_t key, const float center[3], float half,
+                     uint32_t visibility)
+{
+    float positions[24];
+    uint32_t triangles[36];
     cube_mesh(center, half, positions, triangles);
-    constant_program(c, instructions, &volume.program);
-    memcpy(volume.world_from_object, identity, sizeof identity);
-    assert_ok(brume_scene_set_volume(scene, key, &volume));
+    const brume_mesh mesh = {.name = "cube",
+                             .positions = positions,
+                             .triangles = triangles,
+                             .vertex_count = 8,
+                             .triangle_count = 12};
+    const brume_instances instances = {
+        .world_from_object = identity, .mesh = key, .count = 1, .visibility = visibility};
+    assert_ok(brume_scene_set_mesh(scene, key, &mesh));
+    assert_ok(brume_scene_set_instances(scene, key, &instances));
 }
 
 static void unit(float v[3])

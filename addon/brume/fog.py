@@ -14,7 +14,8 @@ from bpy.props import (
 )
 
 from . import compat
-from .panels import _Panel
+from .panels import EnginePanel
+from .properties import changed
 
 # Kinds of objects that can be fog, or have points or particles that are.
 _TYPES = {'EMPTY', 'MESH', 'META', 'POINTCLOUD', 'CURVE', 'SURFACE', 'FONT'}
@@ -23,11 +24,6 @@ _THEMSELVES = {'EMPTY', 'META'}
 CURVES = ("Radius", "Strength")
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
-
-
-def _changed(source, context):
-    """Nothing; but Blender evaluates an object anew after a script set a property only if the
-    property has such a function."""
 
 
 def _attribute_names(source, context, text):
@@ -48,12 +44,12 @@ def _system_names(source, context, text):
 
 class BrumeFogSource(bpy.types.PropertyGroup):
     name: StringProperty(
-        name="Name", default="Fog", update=_changed, override=_OVERRIDE)
+        name="Name", default="Fog", update=changed, override=_OVERRIDE)
     enabled: BoolProperty(
-        name="Enabled", default=True, update=_changed, override=_OVERRIDE,
+        name="Enabled", default=True, update=changed, override=_OVERRIDE,
         description="Lets this source give fog in the viewport and in renders")
     source: EnumProperty(
-        name="Source", default='OBJECT', update=_changed, override=_OVERRIDE,
+        name="Source", default='OBJECT', update=changed, override=_OVERRIDE,
         description="What the fog sits on. Time and memory grow with the number of Gaussians, and "
                     "with the space that each fills",
         items=[('OBJECT', "Object", "An empty is one ball of fog as large as it is displayed; "
@@ -63,47 +59,47 @@ class BrumeFogSource(bpy.types.PropertyGroup):
                ('PARTICLES', "Particles", "Each living particle of a particle system is a ball of "
                                           "fog as large as its size", 2)])
     particle_system: StringProperty(
-        name="Particle System", update=_changed, override=_OVERRIDE, search=_system_names,
+        name="Particle System", update=changed, override=_OVERRIDE, search=_system_names,
         search_options={'SUGGESTION'},
         description="The particle system; empty: the first that is no hair")
     radius: FloatProperty(
-        name="Radius", default=1.0, min=0.0, soft_max=10.0, precision=3, update=_changed,
+        name="Radius", default=1.0, min=0.0, soft_max=10.0, precision=3, update=changed,
         override=_OVERRIDE,
         description="Multiplies the size of each ball of fog: that of a particle, the radius of a "
                     "point (1 m if it has none) or of a metaball, the display size of an empty. "
                     "There 2 % of the density in its middle is left. Small ones in a large scene "
                     "need more Volume Resolution; large ones that overlap take more time")
     density: FloatProperty(
-        name="Density", default=1.0, min=0.0, soft_max=10.0, precision=3, update=_changed,
+        name="Density", default=1.0, min=0.0, soft_max=10.0, precision=3, update=changed,
         override=_OVERRIDE,
         description="Density in the middle of each ball of fog, per metre. Where they overlap it "
                     "adds up")
     color: FloatVectorProperty(
         name="Color", subtype='COLOR', default=(0.8, 0.8, 0.8), min=0.0, max=1.0,
-        update=_changed, override=_OVERRIDE,
+        update=changed, override=_OVERRIDE,
         description="Share of the light that the fog scatters; it absorbs the rest. Where balls "
                     "of fog overlap, the denser one's color counts more")
     color_attribute: StringProperty(
-        name="Color Attribute", update=_changed, override=_OVERRIDE, search=_color_names,
+        name="Color Attribute", update=changed, override=_OVERRIDE, search=_color_names,
         search_options={'SUGGESTION'},
         description="Color attribute of the points that multiplies the color; colors of face "
                     "corners are averaged. Geometry nodes may make it. Empty: none")
     factor_attribute: StringProperty(
-        name="Factor", update=_changed, override=_OVERRIDE,
+        name="Factor", update=changed, override=_OVERRIDE,
         search=_attribute_names, search_options={'SUGGESTION'},
         description="Attribute or vertex group of the points, from 0 to 1, along which the curves "
                     "change radius and strength. A vertex group of a large mesh takes its time to "
                     "read. Empty: the curves are not used")
     material: PointerProperty(
-        name="Material", type=bpy.types.Material, update=_changed, override=_OVERRIDE,
+        name="Material", type=bpy.types.Material, update=changed, override=_OVERRIDE,
         description="Material whose Volume output the fog has; its Attribute nodes read "
                     "\"density\" and \"color\". Empty: plain fog of the color above")
     anisotropy: FloatProperty(
-        name="Anisotropy", default=0.0, min=-0.99, max=0.99, update=_changed, override=_OVERRIDE,
+        name="Anisotropy", default=0.0, min=-0.99, max=0.99, update=changed, override=_OVERRIDE,
         description="Where plain fog scatters light to: above 0 onwards, as mist does, so that it "
                     "glows around lights; below 0 back to where it came from")
     curves: PointerProperty(
-        name="Curves", type=bpy.types.NodeTree, update=_changed, override=_OVERRIDE,
+        name="Curves", type=bpy.types.NodeTree, update=changed, override=_OVERRIDE,
         poll=lambda source, tree: is_curves(tree),
         description="Curves that multiply radius and strength of each ball of fog: along the life "
                     "of a particle, from birth to death, or the factor of a point. Other sources "
@@ -217,7 +213,7 @@ class BRUME_UL_fog(bpy.types.UIList):
         row.prop(source, "enabled", text="")
 
 
-class _FogPanel(_Panel):
+class _FogPanel(EnginePanel):
     bl_context = "object"
 
     @classmethod

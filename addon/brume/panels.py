@@ -7,7 +7,7 @@ from . import compat, native
 from .properties import PASSES
 
 
-class _Panel:
+class EnginePanel:
     bl_space_type = 'PROPERTIES'
     bl_region_type = 'WINDOW'
     COMPAT_ENGINES = {'BRUME'}
@@ -27,7 +27,7 @@ class _Panel:
         return self.layout
 
 
-class _RenderPanel(_Panel):
+class _RenderPanel(EnginePanel):
     bl_context = "render"
 
 
@@ -122,7 +122,7 @@ class BRUME_PT_film(_RenderPanel, bpy.types.Panel):
         layout.prop(context.scene.render, "filter_size")
 
 
-class BRUME_PT_passes(_Panel, bpy.types.Panel):
+class BRUME_PT_passes(EnginePanel, bpy.types.Panel):
     bl_label = "Passes"
     bl_context = "view_layer"
 
@@ -134,7 +134,7 @@ class BRUME_PT_passes(_Panel, bpy.types.Panel):
             column.prop(getattr(context.view_layer, owner) if owner else context.view_layer, name)
 
 
-class BRUME_PT_override(_Panel, bpy.types.Panel):
+class BRUME_PT_override(EnginePanel, bpy.types.Panel):
     bl_label = "Override"
     bl_context = "view_layer"
     bl_options = {'DEFAULT_CLOSED'}
@@ -143,7 +143,7 @@ class BRUME_PT_override(_Panel, bpy.types.Panel):
         self.split().prop(context.view_layer, "material_override")
 
 
-class BRUME_PT_ray_visibility(_Panel, bpy.types.Panel):
+class BRUME_PT_ray_visibility(EnginePanel, bpy.types.Panel):
     bl_label = "Ray Visibility"
     bl_context = "object"
     bl_parent_id = "OBJECT_PT_visibility"
@@ -160,7 +160,7 @@ class BRUME_PT_ray_visibility(_Panel, bpy.types.Panel):
             layout.prop(ob, "visible_shadow", text="Shadow", toggle=False)
 
 
-class BRUME_PT_material_settings(_Panel, bpy.types.Panel):
+class BRUME_PT_material_settings(EnginePanel, bpy.types.Panel):
     """How alpha is read, where Blender has a setting for that."""
     bl_label = "Settings"
     bl_context = "material"
@@ -177,7 +177,7 @@ class BRUME_PT_material_settings(_Panel, bpy.types.Panel):
             layout.prop(material, "alpha_threshold")
 
 
-class _LightPanel(_Panel):
+class _LightPanel(EnginePanel):
     bl_context = "data"
     types = {'POINT', 'SUN', 'SPOT', 'AREA'}
 

@@ -27,14 +27,14 @@ def _apply_preset(settings, context):
         setattr(settings, name, value)
 
 
-def _changed(settings, context):
-    """Nothing; but Blender evaluates a scene anew after a script set a property only if the
-    property has such a function."""
+def changed(settings, context):
+    """Nothing; but Blender evaluates a scene or object anew after a script set one of its
+    properties only if that has such a function."""
 
 
 class BrumeSettings(bpy.types.PropertyGroup):
     method: EnumProperty(
-        name="Method", update=_changed,
+        name="Method", update=changed,
         items=METHODS, default='OPV',
         description="How light travels through volumes")
     preset: EnumProperty(
@@ -46,38 +46,38 @@ class BrumeSettings(bpy.types.PropertyGroup):
                ('FINAL', "Final", "Fine, for pictures that are kept; takes many times longer "
                                   "than Preview", 2)])
     samples: IntProperty(
-        name="Render Samples", update=_changed,
+        name="Render Samples", update=changed,
         default=_DEFAULT["samples"], min=1, max=65536, soft_max=256,
         description="Samples a pixel of a final render. Time grows in proportion; noise at edges "
                     "and in volumes falls with the square root")
     viewport_samples: IntProperty(
-        name="Viewport Samples", update=_changed,
+        name="Viewport Samples", update=changed,
         default=16, min=1, max=65536, soft_max=256,
         description="Samples a pixel that the rendered viewport goes on to while nothing "
                     "changes. The first picture after a change always has one")
     viewport_frame_time: IntProperty(
-        name="Frame Time (ms)", update=_changed,
+        name="Frame Time (ms)", update=changed,
         default=100, min=10, max=10000, soft_max=1000,
         description="Milliseconds that a picture of the rendered viewport may take while something "
                     "moves. Less is smoother and rougher: pixels grow, steps through volumes get "
                     "longer, and lattices that must be made anew get coarser. At rest the picture "
                     "always becomes as fine as it should be")
     medium_resolution: IntProperty(
-        name="Volume Resolution", update=_changed,
+        name="Volume Resolution", update=changed,
         default=_DEFAULT["medium_resolution"], min=8, max=1024,
         soft_max=256,
         description="Cells along the longest side of the lattice that holds all volumes, which "
                     "is never finer than their own voxels. More show finer smoke; memory and the "
                     "time to fill it grow with the third power")
     lattice_resolution: IntProperty(
-        name="Light Resolution", update=_changed,
+        name="Light Resolution", update=changed,
         default=_DEFAULT["lattice_resolution"], min=4, max=512,
         soft_max=512,
         description="Cells along the longest side of the lattice in which light travels. More "
                     "give sharper shadows of smoke on smoke; memory and time grow with the third "
                     "power, and with the number of lights")
     depths: EnumProperty(
-        name="Optical Depths", update=_changed, default='PROPAGATED',
+        name="Optical Depths", update=changed, default='PROPAGATED',
         description="How it is found what the volumes let through between each lamp and each cell",
         items=[('PROPAGATED', "Propagated", "Carried outwards from the lamp: quick, and about 1 % "
                                             "off", 0),
@@ -90,56 +90,56 @@ class BrumeSettings(bpy.types.PropertyGroup):
                                          "volumes. Too dark by half where light runs askew to the "
                                          "cells", 3)])
     iterations: IntProperty(
-        name="Iterations", update=_changed,
+        name="Iterations", update=changed,
         default=0, min=0, max=1024,
         description="Steps of the methods that spread light cell by cell; 0 goes on until it "
                     "converged. Single scattering has none")
     shadow_resolution: IntProperty(
-        name="Shadow Resolution", update=_changed,
+        name="Shadow Resolution", update=changed,
         default=_DEFAULT["shadow_resolution"], min=16, max=8192,
         soft_max=4096, subtype='PIXEL',
         description="Side of a shadow map. More give sharper shadows of meshes; memory and the "
                     "time to draw them grow with the square, and with lights and light samples")
     light_samples: IntProperty(
-        name="Light Samples", update=_changed,
+        name="Light Samples", update=changed,
         default=_DEFAULT["light_samples"], min=1, max=256, soft_max=32,
         description="Shadow maps spread over each light. More give smoother soft shadows; time "
                     "and memory grow in proportion")
     world_samples: IntProperty(
-        name="World Samples", update=_changed,
+        name="World Samples", update=changed,
         default=_DEFAULT["world_samples"], min=1, max=1024, soft_max=512,
         description="Directions that stand for the world's light, each with a small shadow map. "
                     "More soften its shadows and catch smaller bright spots of an environment "
                     "texture; time and memory grow in proportion")
     step: FloatProperty(
-        name="Step", update=_changed,
+        name="Step", update=changed,
         default=_DEFAULT["step"], min=0.05, max=16.0, soft_max=4.0, precision=2,
         description="Length of a step through volumes, in cells of their lattice. Each sample "
                     "begins its steps elsewhere, so that long ones still add up to the whole: "
                     "they cost grain, not detail. Time grows in inverse proportion")
     memory_budget: IntProperty(
-        name="Memory Budget (MiB)", update=_changed,
+        name="Memory Budget (MiB)", update=changed,
         default=2048, min=64, max=1048576, soft_max=32768,
         description="Mebibytes that may be used on the GPU. Lattices that would not fit are made "
                     "coarser, with a warning")
     world_unlimited: BoolProperty(
-        name="Unlimited", update=_changed,
+        name="Unlimited", update=changed,
         default=False,
         description="Lets the world's volume go on for ever, as in Cycles. Suns and the sky "
                     "are then swallowed on their way: only lamps that stand in the scene light it")
     world_reach: FloatProperty(
-        name="World Volume Reach", update=_changed,
+        name="World Volume Reach", update=changed,
         default=0.0, min=0.0, soft_max=1000.0, subtype='DISTANCE',
         description="How far around the scene's objects the world's volume goes; beyond, light "
                     "travels freely, so that sun and sky reach it. Its cells grow with it. "
                     "0: half of the scene's diagonal")
     seed: IntProperty(
-        name="Seed", update=_changed,
+        name="Seed", update=changed,
         default=0, min=0,
         description="Another number gives other noise of the same amount; one number gives the "
                     "same picture every time")
     show_statistics: BoolProperty(
-        name="Viewport Statistics", update=_changed,
+        name="Viewport Statistics", update=changed,
         default=False,
         description="Shows samples and the time of each stage in the rendered viewport's corner. "
                     "Final renders always tell their times, in the status bar and the info log")

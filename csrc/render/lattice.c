@@ -9,7 +9,6 @@
 #include <math.h>
 #include <string.h>
 
-#define NODE_BYTES 8      /* of one light: four halves */
 #define SKY_NODE_BYTES 24 /* three times four halves */
 
 struct box {
@@ -135,14 +134,15 @@ static int layout_tiles(struct renderer *renderer, int limit)
 static uint64_t tau_bytes(const struct renderer *renderer)
 {
     const int *size = renderer->tau_size;
-    return (uint64_t)size[0] * (uint64_t)size[1] * (uint64_t)size[2] * NODE_BYTES;
+    return (uint64_t)size[0] * (uint64_t)size[1] * (uint64_t)size[2] * DEPTH_NODE_BYTES;
 }
 
 uint64_t lattice_depth_bytes(const struct renderer *renderer, const brume_settings *settings)
 {
     const uint64_t nodes = (uint64_t)settings->lattice_resolution + 3;
     /* Twice: the last column of tiles may be nearly empty. And what is needed beside them. */
-    return nodes * nodes * nodes * NODE_BYTES * 2 * ((uint64_t)renderer->shadows.light_count + 9) +
+    return nodes * nodes * nodes * DEPTH_NODE_BYTES * 2 *
+               ((uint64_t)renderer->shadows.light_count + 9) +
            (1u << 20);
 }
 

@@ -9,8 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define NODE_BYTES 8
-
 uint32_t depths_samples(const struct gpu_light *light, float cell)
 {
     int extended;
@@ -34,7 +32,7 @@ uint32_t depths_samples(const struct gpu_light *light, float cell)
 uint64_t opv_texture_bytes(int width, int height, int depth)
 {
     return (uint64_t)texture_side(width) * (uint64_t)texture_side(height) *
-           (uint64_t)texture_side(depth) * NODE_BYTES;
+           (uint64_t)texture_side(depth) * DEPTH_NODE_BYTES;
 }
 
 uint64_t depths_working_bytes(const brume_settings *settings, const struct gpu_light *lights,
@@ -77,6 +75,22 @@ brume_result opv_go_on(const struct opv_work *run, float part)
     struct job_control *control = run->input->control;
     job_report(control, BRUME_STAGE_TRANSPORT, 0.1f + 0.1f * (run->done + run->share * part));
     return job_cancelled(control) ? fail(BRUME_E_CANCELLED, "cancelled") : BRUME_OK;
+}
+
+brume_result opv_slabs(struct opv_work *run, const struct program *program,
+                       struct gpu_lattice_pass pass, const ivec4 *dims, float from, float part)
+{
+    /* A GPU takes the lattice whole; a CPU takes about a tenth of a second a slab. */
+    const int slab = run->input->gpu->context.info.software ? 2 * GROUP_CELLS : dims->z;
+    for (int z = 0; z < dims->z; z += slab) {
+        TRY(opv_go_on(run, from + part * (float)z / (float)dims->z));
+        pass.slab.z = z;
+        pass.slab.w = z + slab < dims->z ? z + slab : dims->z;
+        TRY(opv_set_pass(run, pass));
+        program_dispatch(program, dims->x, dims->y, pass.slab.w - z);
+        glFinish(); /* or a cancel would find all of them in the driver's queue */
+    }
+    return BRUME_OK;
 }
 
 /* --- Sources ------------------------------------------------------------------------------ */

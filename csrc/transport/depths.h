@@ -5,6 +5,8 @@
 
 #include "transport/method.h"
 
+#define DEPTH_NODE_BYTES 8 /* of one lamp: four halves */
+
 /* Of how many of a lamp's samples the transmittances are averaged: 1, but for lamps so wide that it
  * shows. */
 uint32_t depths_samples(const struct gpu_light *light, float cell);

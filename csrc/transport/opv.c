@@ -6,36 +6,9 @@
 #include "base/result.h"
 #include "transport/depths.h"
 #include "transport/method.h"
+#include "transport/opv_ways.h"
 
 #include <stdlib.h>
-
-/* Runs a lattice program in slabs, so that a cancel need not wait for the whole lattice. */
-static brume_result run_slabs(const struct transport_input *input, const struct program *program,
-                              struct gpu_lattice_pass pass, const ivec4 *dims, float progress)
-{
-    /* A GPU takes the lattice whole; a CPU takes about a tenth of a second a slab. */
-    const int slab = input->gpu->context.info.software ? 2 * GROUP_CELLS : dims->z;
-    brume_result result = BRUME_OK;
-    struct buffer block = {0};
-    for (int z = 0; z < dims->z && result == BRUME_OK; z += slab) {
-        if (job_cancelled(input->control))
-            result = fail(BRUME_E_CANCELLED, "cancelled");
-        pass.slab.z = z;
-        pass.slab.w = z + slab < dims->z ? z + slab : dims->z;
-        if (result == BRUME_OK)
-            result = buffer_update(&input->gpu->memory, &block, FOR_TRANSPORT, sizeof pass, &pass,
-                                   "lattice pass");
-        if (result == BRUME_OK) {
-            glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_STAGE, block.id);
-            program_dispatch(program, dims->x, dims->y, pass.slab.w - z);
-            if (slab < dims->z)
-                glFinish();
-        }
-    }
-    buffer_finish(&input->gpu->memory, &block);
-    job_report(input->control, BRUME_STAGE_TRANSPORT, progress);
-    return result;
-}
 
 /* All that a light's depths are made from, and where they are. 0: the light has no tile. */
 static uint64_t tau_signature(const struct transport_input *input, const struct gpu_light *light)
@@ -132,8 +105,11 @@ static brume_result run_sky(struct transport *transport, const struct transport_
         glBindImageTexture((GLuint)(SLOT_OUTPUT + i), transport->sky[i].id, 0, GL_TRUE, 0,
                            GL_WRITE_ONLY, GL_RGBA16F);
     }
-    const struct gpu_lattice_pass pass = {0};
-    TRY(run_slabs(input, program, pass, dims, 0.25f));
+    struct opv_work work = {.input = input, .done = 1.0f, .share = 0.5f}; /* after the lamps' */
+    const brume_result result =
+        opv_slabs(&work, program, (struct gpu_lattice_pass){0}, dims, 0.0f, 1.0f);
+    buffer_finish(&input->gpu->memory, &work.block);
+    TRY(result);
     transport->sky_signature = wanted;
     ++input->stats->sky_propagated;
     return BRUME_OK;

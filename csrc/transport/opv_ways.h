@@ -30,6 +30,11 @@ void opv_bind_image(const struct texture *texture);
 /* Between two steps: tells the progress, `part` of the run, and ends a cancelled one. */
 brume_result opv_go_on(const struct opv_work *run, float part);
 
+/* Runs a program over a whole lattice in slabs, so that a cancel need not wait for all of it; the
+ * progress goes on from one part of the run by another. */
+brume_result opv_slabs(struct opv_work *run, const struct program *program,
+                       struct gpu_lattice_pass pass, const ivec4 *dims, float from, float part);
+
 /* Bytes of a texture that holds depths. */
 uint64_t opv_texture_bytes(int width, int height, int depth);
 

@@ -782,7 +782,7 @@ def drawn(ob):
         context = SimpleNamespace(engine='BRUME', object=ob)
         if panel.poll(context):
             pane = SimpleNamespace(layout=Layout(found))
-            pane.split = lambda pane=pane: panels._Panel.split(pane)
+            pane.split = lambda pane=pane: panels.EnginePanel.split(pane)
             panel.draw(pane, context)
     for made in ob.brume.fog_sources:
         item = SimpleNamespace(_ICONS=fog.BRUME_UL_fog._ICONS)

@@ -348,25 +348,17 @@ static void thin_media(void **state)
         brume_scene *scene;
         assert_ok(brume_scene_create(device, &scene));
         for (int box = 0; box < 5; ++box) {
-            float positions[24];
-            uint32_t triangles[36];
-            brume_instruction instructions[4];
             const float sigma_t = 0.5f + 2.0f * (float)(box % 2) + 0.5f * (float)box;
             const struct coefficients fog = {.sigma_a = {sigma_t, sigma_t, sigma_t}};
-            brume_volume volume = {.name = "box",
-                                   .positions = positions,
-                                   .triangles = triangles,
-                                   .vertex_count = 8,
-                                   .triangle_count = 12};
-            cube_mesh(origin, 1.0f, positions, triangles);
-            constant_program(&fog, instructions, &volume.program);
-            memcpy(volume.world_from_object, identity, sizeof identity);
+            struct fog_cube cube;
+            fog_cube_init(&cube, origin, 1.0f, &fog);
+            float *matrix = cube.volume.world_from_object;
             /* Along the first long axis. */
             const int along = sizes[shape][0] == 1.0f ? 0 : 1;
             for (int axis = 0; axis < 3; ++axis)
-                volume.world_from_object[5 * axis] = axis == along ? 0.2f : sizes[shape][axis];
-            volume.world_from_object[12 + along] = -0.8f + 0.4f * (float)box;
-            assert_ok(brume_scene_set_volume(scene, (uint64_t)box + 1, &volume));
+                matrix[5 * axis] = axis == along ? 0.2f : sizes[shape][axis];
+            matrix[12 + along] = -0.8f + 0.4f * (float)box;
+            assert_ok(brume_scene_set_volume(scene, (uint64_t)box + 1, &cube.volume));
         }
         set_lamps(scene, 0, origin);
         assert_as_marched(scene, (brume_settings){.lattice_resolution = 50}, 3 + PLACES,

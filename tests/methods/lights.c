@@ -123,22 +123,11 @@ static void shut_in(void **state)
     static const float place[3] = {0, 0, 0.5f};
     static const float directions[][3] = {{0, 0, -1}, {0.3f, -0.5f, -0.8f}, {1, 1, 1}};
     static const uint32_t types[] = {BRUME_LIGHT_POINT, BRUME_LIGHT_RECTANGLE};
-    float positions[24];
-    uint32_t triangles[36];
-    cube_mesh(place, 0.2f, positions, triangles);
-    const brume_mesh box = {.name = "box",
-                            .positions = positions,
-                            .triangles = triangles,
-                            .vertex_count = 8,
-                            .triangle_count = 12};
-    const brume_instances instances = {
-        .world_from_object = identity, .mesh = 2, .count = 1, .visibility = BRUME_VISIBLE_SHADOW};
     for (int i = 0; i < 6; ++i) {
         brume_scene *scene;
         assert_ok(brume_scene_create(device, &scene));
         add_plate(scene, 1, origin, down, 4.0f);
-        assert_ok(brume_scene_set_mesh(scene, 2, &box));
-        assert_ok(brume_scene_set_instances(scene, 2, &instances));
+        add_cube(scene, 2, place, 0.2f, BRUME_VISIBLE_SHADOW);
         brume_light lamp = point_lamp(place, 10.0f);
         lamp.type = types[i % 2];
         lamp.size[0] = lamp.size[1] = 0.1f;
@@ -303,22 +292,6 @@ static void lamp_in_a_solid(void **state)
 {
     (void)state;
     const struct coefficients fog = {.sigma_s = {1, 1, 1}};
-    const brume_material grey = {.diffuse = {0.5f, 0.5f, 0.5f}, .roughness = 1, .alpha = 1};
-    const uint64_t materials[1] = {1};
-    float positions[24];
-    uint32_t triangles[36];
-    cube_mesh(origin, 0.3f, positions, triangles);
-    const brume_mesh cube = {.name = "solid",
-                             .positions = positions,
-                             .triangles = triangles,
-                             .materials = materials,
-                             .vertex_count = 8,
-                             .triangle_count = 12,
-                             .material_count = 1};
-    const brume_instances one = {.world_from_object = identity,
-                                 .mesh = 1,
-                                 .count = 1,
-                                 .visibility = BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW};
     const brume_light lamp = point_lamp(origin, 100.0f);
     brume_view view = orthographic_view(origin, (float[3]){0.2f, 0.3f, -1}, 2.0f, 5.0f, 32);
     double bright[2];
@@ -327,10 +300,8 @@ static void lamp_in_a_solid(void **state)
         assert_ok(brume_scene_create(device, &scene));
         add_fog_cube(scene, 1, origin, 1.0f, &fog);
         assert_ok(brume_scene_set_light(scene, 1, &lamp));
-        assert_ok(brume_scene_set_material(scene, 1, &grey));
-        assert_ok(brume_scene_set_mesh(scene, 1, &cube));
         if (with_solid)
-            assert_ok(brume_scene_set_instances(scene, 1, &one));
+            add_cube(scene, 1, origin, 0.3f, BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW);
         brume_job *job = render(scene, NULL, &view);
         float *pixels = read_pass(job, &view, BRUME_PASS_COMBINED);
         bright[with_solid] = 0.0;

@@ -57,18 +57,9 @@ static struct volume *cube_make(float sigma_s)
 {
     const struct coefficients c = {.sigma_s = {sigma_s, sigma_s, sigma_s}, .g = 0.5f};
     const float origin[3] = {0};
-    float positions[24];
-    uint32_t triangles[36];
-    brume_instruction code[4];
-    brume_volume source = {.name = "cube",
-                           .positions = positions,
-                           .triangles = triangles,
-                           .vertex_count = 8,
-                           .triangle_count = 12};
-    memcpy(source.world_from_object, identity, sizeof identity);
-    cube_mesh(origin, 1.0f, positions, triangles);
-    constant_program(&c, code, &source.program);
-    return volume_of(&source);
+    struct fog_cube cube;
+    fog_cube_init(&cube, origin, 1.0f, &c);
+    return volume_of(&cube.volume);
 }
 
 /* Evenly spread over the cube from 0 to 1, side^3 of them, jittered; about two cells of a lattice

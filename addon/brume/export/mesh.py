@@ -31,7 +31,7 @@ def read(mesh):
         "corner_normals": normals[corners],
         "corner_uvs": compat.corner_uvs(layer, len(mesh.loops))[corners] if layer else None,
         "triangle_slots": values(mesh.loop_triangles, "material_index", 1,
-                               np.int32).astype(np.uint16).ravel(),
+                                 np.int32).astype(np.uint16).ravel(),
     }
 
 

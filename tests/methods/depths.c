@@ -573,51 +573,60 @@ static void gaussian_depths(void **state)
 
 /* --- Costs ---------------------------------------------------------------------------------- */
 
-/* The best of three frames with that many moving lamps, ms of the processor, which other work on
- * the machine changes little; nearly all of it propagation. Without what compiling takes. */
-static double propagation_ms(brume_scene *scene, uint32_t lamps, uint32_t depths)
+/* A frame with that many moved lamps, ms of the processor, nearly all of it propagation. */
+static double propagation_ms(brume_scene *scene, uint32_t lamps, uint32_t depths, uint32_t *lots)
 {
     const brume_settings settings = {
         .lattice_resolution = 40, .depths = depths, .light_samples = 1, .shadow_resolution = 16};
     const brume_view view = orthographic_view(origin, (float[3]){0, 0, -1}, 1.0f, 5.0f, 8);
-    double best = INFINITY;
-    uint32_t lots = 11;
-    for (int time = 0; time < 4; ++time) {
-        for (uint64_t key = 1; key <= lamps; ++key) {
-            const float from[3] = {(float)lot(&lots), (float)lot(&lots), (float)lot(&lots)};
-            const brume_light lamp = point_lamp(from, 1.0f);
+    for (uint64_t key = 1; key <= 4; ++key) {
+        const float from[3] = {(float)lot(lots), (float)lot(lots), (float)lot(lots)};
+        const brume_light lamp = point_lamp(from, 1.0f);
+        if (key <= lamps)
             assert_ok(brume_scene_set_light(scene, key, &lamp));
-        }
-        const clock_t began = clock();
-        brume_job *job = render(scene, &settings, &view);
-        const double spent = 1000.0 * (double)(clock() - began) / CLOCKS_PER_SEC;
-        brume_stats stats;
-        assert_ok(brume_job_stats(job, &stats));
-        assert_int_equal(stats.lights_propagated, lamps);
-        if (time > 0)
-            best = fmin(best, spent);
-        brume_job_release(job);
+        else
+            assert_ok(brume_scene_remove(scene, BRUME_KIND_LIGHT, key));
     }
-    return best;
+    const clock_t began = clock();
+    brume_job *job = render(scene, &settings, &view);
+    const double spent = 1000.0 * (double)(clock() - began) / CLOCKS_PER_SEC;
+    brume_stats stats;
+    assert_ok(brume_job_stats(job, &stats));
+    assert_int_equal(stats.lights_propagated, lamps);
+    brume_job_release(job);
+    return spent;
 }
 
-/* By ratios far from what they are held to (80 and 1.1), whatever else the machine does. */
+/* By ratios far from what they are held to (80 and 1.1). The least of several rounds, for other
+ * work on the machine only adds; the first, in which shaders are compiled, does not count. */
 static void what_ways_cost(void **state)
 {
     (void)state;
+    static const struct way {
+        uint32_t lamps, depths;
+    } ways[] = {{1, BRUME_DEPTHS_PROPAGATED},
+                {4, BRUME_DEPTHS_PROPAGATED},
+                {1, BRUME_DEPTHS_ITERATED},
+                {4, BRUME_DEPTHS_ITERATED}};
     const struct gaussians sixteen = scattered(16, 0.25, 0.5, 4.0);
     brume_scene *scene = scene_of(&sixteen);
-    const double one = propagation_ms(scene, 1, BRUME_DEPTHS_PROPAGATED);
-    const double published = propagation_ms(scene, 1, BRUME_DEPTHS_ITERATED);
-    const double published_four = propagation_ms(scene, 4, BRUME_DEPTHS_ITERATED);
-    const double four = propagation_ms(scene, 4, BRUME_DEPTHS_PROPAGATED);
+    double best[4] = {INFINITY, INFINITY, INFINITY, INFINITY};
+    uint32_t lots = 11;
+    bool as_held = false;
+    for (int round = 0; round < 10 && !as_held; ++round) {
+        for (size_t way = 0; way < 4; ++way) {
+            const double spent = propagation_ms(scene, ways[way].lamps, ways[way].depths, &lots);
+            if (round > 0)
+                best[way] = fmin(best[way], spent);
+        }
+        as_held = round > 0 && best[2] > 4.0 * best[0] && best[2] > best[1] &&
+                  best[3] < 1.5 * best[2];
+    }
     print_message(
-        "ms at 40^3, one lamp and four: bricks %.1f and %.1f, as published %.0f and %.0f\n", one,
-        four, published, published_four);
-    assert_true(published > 4.0 * one);
-    assert_true(published_four < 1.5 * published);
-    assert_true(published > four);
+        "ms at 40^3, one lamp and four: bricks %.1f and %.1f, as published %.0f and %.0f\n", best[0],
+        best[1], best[2], best[3]);
     brume_scene_destroy(scene);
+    assert_true(as_held);
 }
 
 int main(void)

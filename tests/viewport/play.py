@@ -8,6 +8,7 @@ and quits as a user does. Started by launch.py:
 import faulthandler
 import importlib
 import json
+import os
 import sys
 import time
 import traceback
@@ -61,10 +62,24 @@ def show(theme, results, names):
             entry["values"] = yield from function()
         except Exception:
             entry["error"] = traceback.format_exc()
+            if launch.READ_ONLY in entry["error"]:
+                leave(launch.FROZEN)
         entry["seconds"] = round(time.perf_counter() - began, 2)
         with open(results, "a", encoding="utf-8") as file:
             file.write(json.dumps(entry) + "\n")
-    bpy.ops.wm.quit_blender()
+    try:
+        bpy.ops.wm.quit_blender()
+    except Exception:
+        said = traceback.format_exc()
+        print(said, flush=True)
+        leave(launch.FROZEN if launch.READ_ONLY in said else 1)
+
+
+def leave(status):
+    """Ends Blender without its doing: nothing else would, once Python may not write."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
 
 
 class Player:
@@ -104,7 +119,8 @@ for handler in ("render_pre", "render_complete", "render_cancel"):
 faulthandler.dump_traceback_later(launch.TIMEOUT_S - 10)
 # Blender notes for the whole process that Python may not write while it draws a panel, and a render
 # that begins in its thread meanwhile makes that stay: no timer could go on (docs/blenders.md). So
-# threads take turns only where one waits, or after longer than a drawing takes.
+# threads take turns only where one waits, or after longer than a drawing takes. Where it happens
+# all the same, this Blender is given up, and launch.py goes on in another.
 sys.setswitchinterval(1.0)
 theme, results, *names = sys.argv[sys.argv.index("--") + 1:]
 bpy.context.preferences.view.show_splash = False

@@ -71,3 +71,9 @@ def test_a_missing_library_is_said(tmp_path):
     run = launch.play("broken", ["no_library"], BRUME_LIBRARY=str(tmp_path / "none.so"))
     assert run.results["no_library"]["error"] is None, run.results["no_library"]["error"]
     assert run.status == 0, run.said[-4000:]
+
+
+def test_a_frozen_blender_is_given_up(tmp_path):
+    run = launch.play("broken", ["freezes_once"], BRUME_FROZE_BEFORE=str(tmp_path / "before"))
+    assert run.results["freezes_once"]["values"] == "went on"
+    assert run.status == 0, run.said[-4000:]

@@ -79,6 +79,7 @@ static const struct {
     [BRUME_PASS_EMISSION] = {"Emit", 3},
     [BRUME_PASS_ENVIRONMENT] = {"Env", 3},
     [BRUME_PASS_TRANSMITTANCE] = {"Transmittance", 3},
+    [BRUME_PASS_VOLUME_INDIRECT] = {"VolumeInd", 3},
 };
 
 uint32_t brume_pass_channels(uint32_t pass)

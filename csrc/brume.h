@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* Raised by every change to a struct, an enumerator or a function below. */
-#define BRUME_ABI 3u
+#define BRUME_ABI 4u
 
 BRUME_API uint32_t brume_abi(void);
 
@@ -420,7 +420,8 @@ BRUME_API brume_result brume_scene_set_world(brume_scene *scene, const brume_wor
 
 typedef enum brume_method {
     BRUME_METHOD_OPV = 0,
-    BRUME_METHOD_COUNT = 1
+    BRUME_METHOD_LPV = 1,
+    BRUME_METHOD_COUNT = 2
 } brume_method;
 
 /* How OPV finds the optical depths from the lamps to the nodes of its lattice. */
@@ -459,7 +460,9 @@ typedef enum brume_pass {
     BRUME_PASS_EMISSION = 4,         /* RGB: surfaces' and media's own light */
     BRUME_PASS_ENVIRONMENT = 5,      /* RGB */
     BRUME_PASS_TRANSMITTANCE = 6,    /* RGB: of the media in front of the first surface */
-    BRUME_PASS_COUNT = 7
+    BRUME_PASS_VOLUME_INDIRECT = 7,  /* RGB: what media scatter of light that was scattered or
+                                        reflected before */
+    BRUME_PASS_COUNT = 8
 } brume_pass;
 
 /* Channels of a pass: 4, 3 or 1; 0 for an unknown one. */
@@ -517,6 +520,7 @@ typedef struct brume_stats {
     uint32_t shadow_maps_drawn;  /* by this job, as the two below: what did not change stays */
     uint32_t lights_propagated;  /* lamps whose light was carried through the medium anew */
     uint32_t sky_propagated;     /* how often the world's was */
+    uint32_t iterations;         /* of scattered and reflected light, by this job */
 } brume_stats;
 
 typedef struct brume_job brume_job;

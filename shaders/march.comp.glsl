@@ -5,6 +5,7 @@
 #include "lib/transmittance.glsl"
 #include "lib/shadow.glsl"
 #include "lib/sky.glsl"
+#include "lib/field.glsl"
 #include "lib/world.glsl"
 #include "lib/phase.glsl"
 #include "lib/lamp.glsl"
@@ -24,7 +25,8 @@ layout(std430, binding = SLOT_ACCUMULATION) buffer accumulation_block
 
 struct march_state
 {
-    vec3 direct;        // in-scattered
+    vec3 direct;        // in-scattered: the lights' own light
+    vec3 indirect;      // and what was scattered or reflected before
     vec3 emission;
     vec3 transmittance;
 };
@@ -168,6 +170,10 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
     float sky_every = max(frame.sky_lower.w, dt);
     float sky_next = -1e30;
     vec3 sky = vec3(0.0);
+    // So is the field's, whose look-ups are dear.
+    float field_every = max(0.5 * frame.field_lower.w, dt);
+    float field_next = -1e30;
+    vec3 field = vec3(0.0);
     int first = count, end = 0; // the steps that are not empty
     for (int k = 0; k < count; ++k) {
         float within = step_jitter(jitter, k);
@@ -188,6 +194,13 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
                 sky_next = t + sky_every;
             }
             state.direct += weight * m.sigma_s * sky;
+        }
+        if (field_exists()) {
+            if (t >= field_next) {
+                field = field_scatter(ray.origin + ray.direction * t, -ray.direction, m.g);
+                field_next = t + field_every;
+            }
+            state.indirect += weight * m.sigma_s * field;
         }
         state.emission += weight * m.emission;
         transmittance *= through;
@@ -251,7 +264,7 @@ void main()
     float t_near = frame.clip.x * ray.stretch;
     float t_far = hit ? normal_depth.w * ray.stretch : frame.clip.y * ray.stretch;
 
-    march_state state = march_state(vec3(0.0), vec3(0.0), vec3(1.0));
+    march_state state = march_state(vec3(0.0), vec3(0.0), vec3(0.0), vec3(1.0));
     march_media(state, ray, t_near, t_far, pixel);
 
     // What reaches the camera of what is behind the media and of what is seen through.
@@ -273,10 +286,11 @@ void main()
     }
 
     int index = pixel.y * frame.size.x + pixel.x;
-    vec3 combined = state.direct + emission + surface + environment;
+    vec3 combined = state.direct + state.indirect + emission + surface + environment;
     add(PASS_COMBINED, index, vec4(combined, alpha));
     add(PASS_NORMAL, index, hit ? vec4(normal_depth.xyz, 0.0) : vec4(0.0));
     add(PASS_VOLUME_DIRECT, index, vec4(state.direct, 0.0));
+    add(PASS_VOLUME_INDIRECT, index, vec4(state.indirect, 0.0));
     add(PASS_EMISSION, index, vec4(emission, 0.0));
     add(PASS_ENVIRONMENT, index, vec4(environment, 0.0));
     add(PASS_TRANSMITTANCE, index, vec4(state.transmittance, 0.0));

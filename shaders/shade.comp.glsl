@@ -6,6 +6,7 @@
 #include "lib/shadow.glsl"
 #include "lib/world.glsl"
 #include "lib/bsdf.glsl"
+#include "lib/field.glsl"
 
 layout(local_size_x = GROUP_PIXELS, local_size_y = GROUP_PIXELS) in;
 
@@ -124,6 +125,16 @@ vec3 world_specular(surface s, vec3 p, ivec2 pixel, float within)
            (lit * world_transmittance(p, towards, within));
 }
 
+// Light that was scattered or reflected before. What mirrors show of it is as soft as the lattice.
+vec3 field_surface(surface s, vec3 p)
+{
+    if (!field_reaches(p + s.normal * (0.5 * frame.field_lower.w)))
+        return vec3(0.0);
+    field_light light = field_before(p, s.normal);
+    return s.diffuse * field_irradiance(light, s.normal) / PI +
+           s.specular * field_radiance(light, reflect(-s.view, s.normal));
+}
+
 void main()
 {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, int(frame.march.z));
@@ -147,6 +158,8 @@ void main()
             float within = pixel_random(pixel, 8u);
             radiance += world_diffuse(s, p, pixel, within) + world_specular(s, p, pixel, within);
         }
+        if (field_exists())
+            radiance += field_surface(s, p);
     }
     imageStore(surface_image, pixel, vec4(radiance, 0.0));
 }

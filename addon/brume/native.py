@@ -27,12 +27,12 @@ from pathlib import Path
 
 import numpy as np
 
-ABI = 3
+ABI = 4
 PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONMENT",
-          "TRANSMITTANCE")
-PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3)
+          "TRANSMITTANCE", "VOLUME_INDIRECT")
+PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3, 3)
 STAGES = ("upload", "medium", "shadow", "transport", "gbuffer", "shade", "march", "passes")
-METHODS = {"OPV": 0}
+METHODS = {"OPV": 0, "LPV": 1}
 DEPTHS = {"PROPAGATED": 0, "MARCHED": 1, "CORRECTED": 2, "PAPER": 3, "ITERATED": 4}
 KINDS = {"mesh": 0, "instances": 1, "material": 2, "image": 3, "light": 4, "volume": 5}
 JOB_QUEUED, JOB_RUNNING, JOB_DONE, JOB_FAILED, JOB_CANCELLED = range(5)
@@ -179,7 +179,8 @@ class Stats(Structure):
                 ("total_bytes", c_uint64), ("peak_bytes", c_uint64), ("medium_dims", Dims),
                 ("transport_dims", Dims), ("light_count", c_uint32), ("triangle_count", c_uint32),
                 ("samples", c_uint32), ("shadow_maps_drawn", c_uint32),
-                ("lights_propagated", c_uint32), ("sky_propagated", c_uint32)]
+                ("lights_propagated", c_uint32), ("sky_propagated", c_uint32),
+                ("iterations", c_uint32)]
 
 
 class JobStatus(Structure):

@@ -9,6 +9,9 @@ from . import native
 METHODS = [
     ('OPV', "Single Scattering",
      "Light that volumes scatter once: fast, and too dark in thick clouds", 0),
+    ('LPV', "Light Propagation",
+     "Light that volumes scatter and surfaces reflect goes on from cell to cell, as often as it "
+     "takes: fills rooms and clouds with light, softly", 1),
 ]
 
 PRESETS = {
@@ -149,6 +152,10 @@ class BrumeViewLayerSettings(bpy.types.PropertyGroup):
     use_pass_volume_direct: BoolProperty(
         name="Volume Direct", default=False,
         description="Light that volumes scattered straight from lights and world to the camera")
+    use_pass_volume_indirect: BoolProperty(
+        name="Volume Indirect", default=False,
+        description="Light that volumes scattered to the camera after it was scattered or "
+                    "reflected before")
     use_pass_transmittance: BoolProperty(
         name="Transmittance", default=False,
         description="Share of the light that the volumes in front of the first surface let "
@@ -163,6 +170,7 @@ PASSES = [
     ("EMISSION", "Emit", "RGB", 'COLOR', "use_pass_emit"),
     ("ENVIRONMENT", "Env", "RGB", 'COLOR', "use_pass_environment"),
     ("VOLUME_DIRECT", "VolumeDir", "RGB", 'COLOR', "brume.use_pass_volume_direct"),
+    ("VOLUME_INDIRECT", "VolumeInd", "RGB", 'COLOR', "brume.use_pass_volume_indirect"),
     ("TRANSMITTANCE", "Transmittance", "RGB", 'COLOR', "brume.use_pass_transmittance"),
 ]
 

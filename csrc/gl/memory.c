@@ -74,6 +74,7 @@ static uint64_t texel_bytes(GLenum format)
     case GL_RGBA16F:
         return 8;
     case GL_R32F:
+    case GL_R32UI:
     case GL_DEPTH_COMPONENT32F:
         return 4;
     case GL_R16F:
@@ -96,6 +97,7 @@ brume_result texture_init(struct memory *memory, struct texture *texture, enum p
                           GLenum target, GLenum format, int width, int height, int depth,
                           int levels, const char *label)
 {
+    const int integers = format == GL_R32UI; /* which are fetched, never filtered */
     memset(texture, 0, sizeof *texture);
     while (glGetError() != GL_NO_ERROR)
         ;
@@ -111,11 +113,13 @@ brume_result texture_init(struct memory *memory, struct texture *texture, enum p
                     height, depth, label);
     }
     if (target == GL_TEXTURE_3D) /* what no cell fills is read with weight 0, but NaN stays NaN */
-        glClearTexImage(texture->id, 0, GL_RGBA, GL_FLOAT, NULL);
+        glClearTexImage(texture->id, 0, integers ? GL_RED_INTEGER : GL_RGBA,
+                        integers ? GL_UNSIGNED_INT : GL_FLOAT, NULL);
     glObjectLabel(GL_TEXTURE, texture->id, -1, label);
+    const GLint filter = integers ? GL_NEAREST : GL_LINEAR;
     glTextureParameteri(texture->id, GL_TEXTURE_MIN_FILTER,
-                        levels > 1 ? GL_LINEAR_MIPMAP_LINEAR : GL_LINEAR);
-    glTextureParameteri(texture->id, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+                        levels > 1 ? GL_LINEAR_MIPMAP_LINEAR : filter);
+    glTextureParameteri(texture->id, GL_TEXTURE_MAG_FILTER, filter);
     glTextureParameteri(texture->id, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     glTextureParameteri(texture->id, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
     glTextureParameteri(texture->id, GL_TEXTURE_WRAP_R, GL_CLAMP_TO_EDGE);

@@ -50,7 +50,7 @@ void buffer_finish(struct memory *memory, struct buffer *buffer);
  * ceases to be. Lattices and pictures change their sizes while somebody waits. */
 int texture_side(int texels);
 
-/* target: GL_TEXTURE_2D, _2D_ARRAY or _3D. Linear filter, clamp to edge. */
+/* target: GL_TEXTURE_2D, _2D_ARRAY or _3D. Linear filter (none for integers), clamp to edge. */
 brume_result texture_init(struct memory *memory, struct texture *texture, enum purpose purpose,
                           GLenum target, GLenum format, int width, int height, int depth,
                           int levels, const char *label);

@@ -9,7 +9,7 @@
 
 #include <epoxy/gl.h>
 
-#define PROGRAM_MAX 32
+#define PROGRAM_MAX 48
 
 struct program {
     char name[48];

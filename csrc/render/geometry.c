@@ -438,7 +438,8 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
                            uint32_t visibility, enum geometry_pass pass)
 {
     static const char *const stems[] = {
-        [GEOMETRY_GBUFFER] = "gbuffer", [GEOMETRY_SHADOW] = "shadow", [GEOMETRY_TINT] = "tint"};
+        [GEOMETRY_GBUFFER] = "gbuffer", [GEOMETRY_SHADOW] = "shadow", [GEOMETRY_TINT] = "tint",
+        [GEOMETRY_LINKS] = "links",     [GEOMETRY_REFLECT] = "reflect"};
     const struct program *program;
     TRY(program_draw(&gpu->programs, stems[pass], &program));
     TRY(buffer_update(&gpu->memory, &geometry->stage_block, FOR_TARGET, sizeof *stage, stage,

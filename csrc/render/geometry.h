@@ -52,6 +52,8 @@ enum geometry_pass {
     GEOMETRY_GBUFFER = 0,
     GEOMETRY_SHADOW = 1,
     GEOMETRY_TINT = 2, /* multiplies by the colour of what is seen through; writes no depth */
+    GEOMETRY_LINKS = 3,   /* tells where surfaces cut links of the field's lattice */
+    GEOMETRY_REFLECT = 4, /* positions, normals and reflectances, for reflective shadow maps */
 };
 
 /* Draws what has all bits of `visibility` with the bound framebuffer. */

@@ -5,6 +5,7 @@
 #include "math/frame.h"
 #include "scene/pack.h"
 #include "transport/depths.h"
+#include "transport/lpv.h"
 
 #include <math.h>
 #include <string.h>
@@ -152,6 +153,87 @@ uint64_t lattice_sky_bytes(const brume_settings *settings)
     return nodes * nodes * nodes * SKY_NODE_BYTES;
 }
 
+uint64_t lattice_field_bytes(const brume_settings *settings)
+{
+    const uint64_t cells = (uint64_t)settings->lattice_resolution;
+    return settings->method == BRUME_METHOD_LPV
+               ? cells * cells * cells * (FIELD_CELL_BYTES + FIELD_WORKING_BYTES) + FIELD_FIXED_BYTES
+               : 0;
+}
+
+static void box_grow(struct box *box, float margin)
+{
+    for (int i = 0; i < 3; ++i) {
+        box->lower[i] -= margin;
+        box->upper[i] += margin;
+    }
+}
+
+static void box_cut(struct box *box, const float lower[3], const float upper[3])
+{
+    for (int i = 0; i < 3; ++i) {
+        box->lower[i] = fmaxf(box->lower[i], lower[i]);
+        box->upper[i] = fminf(box->upper[i], upper[i]);
+    }
+}
+
+/* Where light goes to and fro: what is solid, the media, and what of flat geometry, such as the
+ * ground, is around them. With the world's medium, all that the scene shows. */
+static struct box field_box(const struct renderer *renderer, const struct snapshot *snapshot)
+{
+    const struct geometry *geometry = &renderer->geometry;
+    const int fog = renderer->frame.fog_lower.w != 0.0f;
+    struct box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    const struct medium_textures *medium = &renderer->medium;
+    if (geometry->solid_lower[0] <= geometry->solid_upper[0])
+        box_join(&box, geometry->solid_lower, geometry->solid_upper);
+    if (medium->dims[0])
+        box_join(&box, medium->lower, medium->upper);
+    if (box_is_empty(&box))
+        return fog ? scene_box(renderer, snapshot) : box;
+    struct box all = box;
+    if (geometry->lower[0] <= geometry->upper[0])
+        box_join(&all, geometry->lower, geometry->upper);
+    box_grow(&box, 0.25f * longest(&box));
+    box_cut(&box, all.lower, all.upper);
+    return box;
+}
+
+/* The box's lower corner does not lie at a cell's corner or centre: walls, which are often there,
+ * should not either. */
+static void layout_field(struct renderer *renderer, const struct render_request *request)
+{
+    const float corner = 0.38f; /* of a cell, where the box begins */
+    struct gpu_frame *frame = &renderer->frame;
+    const brume_settings *settings = &request->settings;
+    const struct box box = field_box(renderer, request->snapshot);
+    frame->field_dims = (ivec4){0};
+    if (settings->method != BRUME_METHOD_LPV || box_is_empty(&box))
+        return;
+    int resolution = settings->lattice_resolution < 2 ? 2 : settings->lattice_resolution;
+    for (;; resolution = resolution * 3 / 4) {
+        const float cell = fmaxf(longest(&box), 1e-6f) / (float)(resolution - 1);
+        int *dims = &frame->field_dims.x;
+        float lower[3];
+        uint64_t cells = 1;
+        for (int i = 0; i < 3; ++i) {
+            dims[i] = (int)ceilf((box.upper[i] - box.lower[i]) / cell - 1e-3f) + 1;
+            lower[i] = box.lower[i] - corner * cell;
+            cells *= (uint64_t)dims[i];
+        }
+        frame->field_lower = pack(lower, cell);
+        frame->field_dims.w = 1;
+        if (cells * (FIELD_CELL_BYTES + FIELD_WORKING_BYTES) + FIELD_FIXED_BYTES <=
+                renderer->shares.field ||
+            resolution <= 4)
+            break;
+    }
+    if (resolution < settings->lattice_resolution)
+        job_warn(request->control, "FIELD_COARSER",
+                 "lattice of scattered light of %d instead of %d cells, to keep the memory budget",
+                 resolution, settings->lattice_resolution);
+}
+
 brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
                             const struct render_request *request)
 {
@@ -168,6 +250,7 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
     for (uint32_t i = 0; i < renderer->shadows.light_count; ++i)
         renderer->shadows.lights[i].info.w = 0;
     layout_fog(renderer, request->snapshot);
+    layout_field(renderer, request);
     /* The sky's lattice needs a cell's size to march by, medium or not. */
     frame->medium_lower = (vec4){0, 0, 0, 1};
 

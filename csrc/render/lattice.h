@@ -11,6 +11,7 @@
 /* No lattice of these settings is larger. */
 uint64_t lattice_depth_bytes(const struct renderer *renderer, const brume_settings *settings);
 uint64_t lattice_sky_bytes(const brume_settings *settings);
+uint64_t lattice_field_bytes(const brume_settings *settings);
 brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
                             const struct render_request *request);
 

@@ -9,5 +9,6 @@ _Static_assert(sizeof(struct gpu_material) == 96, "gpu_material");
 _Static_assert(sizeof(struct gpu_instance) == 144, "gpu_instance");
 _Static_assert(sizeof(struct gpu_draw) == 112, "gpu_draw");
 _Static_assert(sizeof(struct gpu_lattice_pass) == 32, "gpu_lattice_pass");
+_Static_assert(sizeof(struct gpu_reflection) == 112, "gpu_reflection");
 _Static_assert(sizeof(struct gpu_depth_source) == 48, "gpu_depth_source");
 _Static_assert(sizeof(struct gpu_frame) % 16 == 0, "gpu_frame");

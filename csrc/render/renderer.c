@@ -200,6 +200,7 @@ static brume_result work_transport(struct run *run)
     const struct transport_input input = {
         .gpu = run->gpu,
         .medium = &renderer->medium,
+        .geometry = &renderer->geometry,
         .settings = &request->settings,
         .control = request->control,
         .frame = &renderer->frame,
@@ -208,6 +209,8 @@ static brume_result work_transport(struct run *run)
         .light_count = renderer->shadows.light_count,
         .medium_revision = renderer->stages[BRUME_STAGE_MEDIUM].revision,
         .world_signature = renderer->shadows.world_signature,
+        .world_first = renderer->shadows.world_first,
+        .world_count = renderer->shadows.world_count,
         .stats = &request->stats,
         .tau_size = {renderer->tau_size[0], renderer->tau_size[1], renderer->tau_size[2]},
     };
@@ -359,7 +362,8 @@ static uint64_t product_bytes(const struct renderer *renderer)
     const struct transport *transport = &renderer->transport;
     return medium->scatter.bytes + medium->extinct.bytes + medium->emission.bytes +
            medium->bricks.bytes + renderer->shadows.maps.bytes + transport->tau.bytes +
-           transport->sky[0].bytes + transport->sky[1].bytes + transport->sky[2].bytes;
+           transport->sky[0].bytes + transport->sky[1].bytes + transport->sky[2].bytes +
+           transport->field.bytes;
 }
 
 /* Shares out what pictures, meshes and images leave. What was made under a larger share goes
@@ -377,12 +381,14 @@ static brume_result share_budget(struct run *run)
                     "picture, meshes and images alone need %.1f MiB of graphics memory; the "
                     "memory budget is %.1f MiB",
                     (double)taken / (1 << 20), (double)budget / (1 << 20));
-    const uint64_t rest = budget - taken;
+    const uint64_t all = budget - taken;
+    const uint64_t field = request->settings.method == BRUME_METHOD_LPV ? all / 4 : 0;
+    const uint64_t rest = all - field;
     renderer->shares = (struct shares){
-        .medium = rest / 4, .shadow = rest / 8 * 3, .depth = rest / 4, .sky = rest / 8};
-    if (product_bytes(renderer) + view_pool_bytes(renderer->targets, false) > rest)
+        .medium = rest / 4, .shadow = rest / 8 * 3, .depth = rest / 4, .sky = rest / 8, .field = field};
+    if (product_bytes(renderer) + view_pool_bytes(renderer->targets, false) > all)
         view_pool_trim(run->gpu, &renderer->targets);
-    if (product_bytes(renderer) > rest) {
+    if (product_bytes(renderer) > all) {
         medium_textures_finish(run->gpu, &renderer->medium);
         shadows_finish(run->gpu, &renderer->shadows);
         transport_finish(run->gpu, &renderer->transport);
@@ -491,8 +497,10 @@ static brume_result run_stages(struct run *run)
                                   settings->depths,
                                   least(shares->depth, lattice_depth_bytes(renderer, settings)),
                                   least(shares->sky, lattice_sky_bytes(settings)),
+                                  least(shares->field, lattice_field_bytes(settings)),
+                                  (uint64_t)settings->iterations,
                                   float_bits(snapshot->world.reach)};
-    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 8, work_transport));
+    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 10, work_transport));
     collect_warnings(run);
     return BRUME_OK;
 }

@@ -19,7 +19,7 @@ struct stage_record {
 /* Bytes that each lattice and the shadow maps may take: what the budget leaves beside pictures,
  * meshes and images. */
 struct shares {
-    uint64_t medium, shadow, depth, sky;
+    uint64_t medium, shadow, depth, sky, field;
 };
 
 struct renderer {

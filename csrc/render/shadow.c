@@ -6,6 +6,7 @@
 #include "base/result.h"
 #include "math/frame.h"
 #include "scene/light.h"
+#include "scene/light_view.h"
 #include "scene/world.h"
 
 #include <math.h>
@@ -18,49 +19,6 @@
 #define FEW_DIRECTIONS 16 /* of the world */
 #define MAPS_A_FINISH 8   /* on a CPU */
 #define WORLD_TILES 4     /* maps of the world in one layer */
-
-static float radius_of(const struct geometry *geometry, float center[3])
-{
-    float square = 0.0f;
-    for (int i = 0; i < 3; ++i) {
-        center[i] = 0.5f * (geometry->lower[i] + geometry->upper[i]);
-        const float half = 0.5f * (geometry->upper[i] - geometry->lower[i]);
-        square += half * half;
-    }
-    return sqrtf(square);
-}
-
-/* A map along `towards` (unit, to the light) over the box from lower to upper, with the depths of
- * all geometry. */
-static void orthographic_view(const struct geometry *geometry, const float lower[3],
-                              const float upper[3], const vec4 *towards, int side,
-                              struct gpu_shadow_view *out)
-{
-    float center[3], view[16], projection[16], low[3], high[3], all_low[3], all_high[3];
-    float right[3], up[3];
-    const float radius = fmaxf(radius_of(geometry, center), 1e-4f);
-    const float direction[3] = {-towards->x, -towards->y, -towards->z};
-    const float eye[3] = {center[0] - direction[0] * radius, center[1] - direction[1] * radius,
-                          center[2] - direction[2] * radius};
-    frame_around(direction, right, up);
-    mat4_look(eye, direction, up, view);
-    mat4_bounds(view, lower, upper, low, high);
-    mat4_bounds(view, geometry->lower, geometry->upper, all_low, all_high);
-    /* Square texels, and a texel of room for the filter at the rim. */
-    const float extent = fmaxf(fmaxf(high[0] - low[0], high[1] - low[1]), 1e-4f * radius);
-    const float width = extent * (1.0f + 4.0f / (float)side);
-    const float x = 0.5f * (low[0] + high[0]), y = 0.5f * (low[1] + high[1]);
-    const float near_ = -all_high[2] - 1e-3f * radius, far_ = -all_low[2] + 1e-3f * radius;
-    mat4_orthographic(x - 0.5f * width, x + 0.5f * width, y - 0.5f * width, y + 0.5f * width, near_,
-                      far_, projection);
-    /* Reversed depth: 1 at near, 0 at far. */
-    for (int column = 0; column < 4; ++column)
-        projection[4 * column + 2] = 0.0f;
-    projection[10] = 1.0f / (far_ - near_);
-    projection[14] = far_ / (far_ - near_);
-    mat4_multiply(projection, view, out->clip_from_world.m);
-    out->range = (vec4){1.0f, near_, far_, width / (float)side};
-}
 
 /* Maps of a distant light: over all geometry, and before it a finer one over what is solid where
  * that is much smaller (a house on a wide plain). */
@@ -80,24 +38,10 @@ static void distant_views(const struct geometry *geometry, uint32_t faces, const
                           int side, struct gpu_shadow_view *out)
 {
     if (faces == 2)
-        orthographic_view(geometry, geometry->solid_lower, geometry->solid_upper, towards, side,
-                          out++);
-    orthographic_view(geometry, geometry->lower, geometry->upper, towards, side, out);
-}
-
-static void perspective_view(const float eye[3], const float direction[3], const float up[3],
-                             float tangent, int side, float near_, struct gpu_shadow_view *out)
-{
-    float view[16];
-    mat4_look(eye, direction, up, view);
-    /* Room at the rim for the look-up of a surface, which steps off it by a texel at its distance:
-     * at a cube's corner up to sqrt(6) texels across the map. */
-    tangent *= 1.0f + 6.0f / (float)side;
-    /* Reversed depth without a far plane: near / distance. */
-    const float projection[16] = {1.0f / tangent, 0, 0, 0, 0, 1.0f / tangent, 0, 0,
-                                  0,              0, 0, -1, 0, 0,             near_, 0};
-    mat4_multiply(projection, view, out->clip_from_world.m);
-    out->range = (vec4){0.0f, near_, 0.0f, 2.0f * tangent / (float)side};
+        light_view_distant(geometry->lower, geometry->upper, geometry->solid_lower,
+                           geometry->solid_upper, towards, side, out++);
+    light_view_distant(geometry->lower, geometry->upper, geometry->lower, geometry->upper, towards,
+                       side, out);
 }
 
 /* Faces in the order of shadow_face() in shaders/lib/shadow.glsl. */
@@ -105,25 +49,12 @@ static void lamp_views(const brume_light *light, const struct gpu_light *gpu,
                        const struct gpu_light_sample *sample, const struct geometry *geometry,
                        int side, struct gpu_shadow_view *out)
 {
-    float u[3], v[3], forward[3], center[3];
     const float eye[3] = {sample->position.x, sample->position.y, sample->position.z};
-    const float near_ = fmaxf(1e-4f * radius_of(geometry, center), 1e-4f);
-    light_frame(gpu, u, v, forward);
+    const float near_ = light_view_near(geometry->lower, geometry->upper);
     const uint32_t faces = light_faces(light);
-    if (faces == 1) {
-        perspective_view(eye, forward, v, tanf(0.5f * light->spot_angle), side, near_, out);
-        return;
-    }
-    for (uint32_t face = 0; face < faces; ++face) {
-        float direction[3];
-        for (int i = 0; i < 3; ++i) {
-            const float axes[6] = {forward[i], u[i], -u[i], v[i], -v[i], -forward[i]};
-            direction[i] = axes[face];
-        }
-        /* Upright in the lamp's frame, or the faces would not meet at the cube's edges. */
-        const float *up = face == 3 || face == 4 ? forward : v;
-        perspective_view(eye, direction, up, 1.0f, side, near_, &out[face]);
-    }
+    const float tangent = faces == 1 ? tanf(0.5f * light->spot_angle) : 1.0f;
+    for (uint32_t face = 0; face < faces; ++face)
+        light_view_face(gpu, eye, face, tangent, side, near_, &out[face]);
 }
 
 /* --- Layout ------------------------------------------------------------------------------- */

@@ -7,6 +7,7 @@
 
 static const struct method methods[BRUME_METHOD_COUNT] = {
     [BRUME_METHOD_OPV] = {"OPV", opv_run},
+    [BRUME_METHOD_LPV] = {"LPV", lpv_run},
 };
 
 const struct method *method_find(uint32_t number)
@@ -20,6 +21,7 @@ void transport_bind(const struct transport *transport)
     glBindTextureUnit(SLOT_SKY_R, transport->sky[0].id);
     glBindTextureUnit(SLOT_SKY_G, transport->sky[1].id);
     glBindTextureUnit(SLOT_SKY_B, transport->sky[2].id);
+    glBindTextureUnit(SLOT_FIELD, transport->field.id);
 }
 
 void transport_finish(struct gpu *gpu, struct transport *transport)
@@ -27,6 +29,7 @@ void transport_finish(struct gpu *gpu, struct transport *transport)
     texture_finish(&gpu->memory, &transport->tau);
     for (int i = 0; i < 3; ++i)
         texture_finish(&gpu->memory, &transport->sky[i]);
+    texture_finish(&gpu->memory, &transport->field);
     free(transport->tau_signatures);
     memset(transport, 0, sizeof *transport);
 }

@@ -8,12 +8,14 @@
 #include "base/job.h"
 #include "brume_gpu.h"
 #include "gl/device.h"
+#include "render/geometry.h"
 #include "transport/medium_textures.h"
 
 /* What the view takes light from. */
 struct transport {
     struct texture tau;    /* optical depth to each light over the length of the way, a tile a light */
     struct texture sky[3]; /* the world's light, spherical harmonics a colour */
+    struct texture field;  /* light scattered or reflected before, as lpv_finish leaves it */
     /* Signatures of what a light's tile and the sky hold, 0: nothing of use. */
     uint64_t *tau_signatures, sky_signature;
     uint32_t tau_count;
@@ -22,6 +24,7 @@ struct transport {
 struct transport_input {
     struct gpu *gpu;
     const struct medium_textures *medium;
+    struct geometry *geometry;
     const brume_settings *settings;
     struct job_control *control;
     const struct gpu_frame *frame;  /* lattices are laid out in it, and bound */
@@ -31,6 +34,7 @@ struct transport_input {
     uint64_t medium_revision;
     uint64_t world_signature;       /* of the world's samples and shadow maps */
     brume_stats *stats;             /* counts what is propagated */
+    uint32_t world_first, world_count; /* samples */
     int tau_size[3];                /* texels of the optical depths' texture, 0: none wanted */
 };
 
@@ -46,5 +50,6 @@ void transport_finish(struct gpu *gpu, struct transport *transport);
 
 /* The methods. */
 brume_result opv_run(struct transport *transport, const struct transport_input *input);
+brume_result lpv_run(struct transport *transport, const struct transport_input *input);
 
 #endif

@@ -37,6 +37,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_ACCUMULATION 5
 #define SLOT_DEPTH_SOURCES 6
 #define SLOT_DEPTH_GROUPS 7
+#define SLOT_POWERS 8
 
 /* Textures */
 #define SLOT_MEDIUM_SCATTER 0
@@ -58,9 +59,20 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_MATERIAL_ROUGHNESS 16
 #define SLOT_GBUFFER_TINT 17
 #define SLOT_DEPTH_BEFORE 18
+#define SLOT_FIELD 19
+#define SLOT_LINKS 20
+#define SLOT_CELL_EXTINCT 21
+#define SLOT_CELL_ALBEDO 22
+#define SLOT_WALLS 23
+#define SLOT_FLOW 24         /* and two more: red, green, blue */
+#define SLOT_REFLECTED 27    /* and two more */
+#define SLOT_RSM 27          /* and two more: position, normal, reflectance */
 
-/* Images written by compute passes */
+/* Images written by compute passes, and by the drawing of links */
 #define SLOT_OUTPUT 0
+#define SLOT_OUTPUT_LINKS 0
+#define SLOT_OUTPUT_WALLS 1
+#define SLOT_OUTPUT_FIELD 3  /* and two more */
 
 /* Cells along a brick's side: the unit of empty-space skipping. */
 #define BRICK_CELLS 8
@@ -140,13 +152,22 @@ struct gpu_draw {
     mat4 clip_from_world;
     vec4 clip;           /* near, far along the view; z: 1 orthographic */
     vec4 eye;            /* camera position, or the direction it looks along; w: 0 direction */
-    uvec4 info;          /* x: seed of the alpha test */
+    uvec4 info;          /* x: seed of the alpha test; y: number of a link */
 };
 
 /* The lattice stages' block. */
 struct gpu_lattice_pass {
     ivec4 offset;        /* what a stage's shader says */
     ivec4 slab;          /* z, w: first node layer of this dispatch, one after its last; x, y unused */
+};
+
+/* One reflective shadow map on its way into the field's lattice. */
+struct gpu_reflection {
+    mat4 clip_from_world;
+    vec4 scale;          /* x: texel's side, m at distance 1 (perspective) or anywhere; y: times the
+                            light of its sample */
+    ivec4 what;          /* light, -1: the world; sample; face; texels of a side */
+    ivec4 tiles;         /* x: layers of the lattice in a row of the picture that it is gathered in */
 };
 
 /* A point of a lamp, or a direction towards one, that optical depths are found to. */
@@ -165,7 +186,8 @@ struct gpu_depth_source {
 #define PASS_EMISSION 4
 #define PASS_ENVIRONMENT 5
 #define PASS_TRANSMITTANCE 6
-#define PASS_COUNT 7
+#define PASS_VOLUME_INDIRECT 7
+#define PASS_COUNT 8
 
 struct gpu_frame {
     vec4 ray_origin, ray_origin_x, ray_origin_y; /* ray = origin + x ndc.x + y ndc.y */
@@ -177,6 +199,8 @@ struct gpu_frame {
     ivec4 medium_dims;   /* w: 1 if there is one */
     vec4 lattice_lower;  /* transport lattice; w: cell, m */
     ivec4 lattice_dims;  /* nodes along the sides; w: 1 if there is one */
+    vec4 field_lower;    /* lattice of light scattered or reflected; w: cell, m */
+    ivec4 field_dims;    /* cells along the sides; w: 1 if there is one */
     vec4 sky_lower;      /* lattice of the world's light; w: cell, m */
     ivec4 sky_dims;      /* nodes along the sides; w: 1 if there is one */
     vec4 fog_lower;      /* the world's medium; w: 1 if there is one */

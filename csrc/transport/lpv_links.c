@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Blockers from geometry: drawn once along each of the 13 links, so that a pixel's centre is a line
+ * through cells' centres and a fragment a cut of one link. Exact, however thin a wall is. */
+#include "base/result.h"
+#include "transport/lpv.h"
+
+#include <string.h>
+
+#define LINKS 13
+
+/* As LINKS of shaders/lib/links.glsl. */
+static const int links[LINKS][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 0}, {1, -1, 0},
+                                    {1, 0, 1},  {1, 0, -1}, {0, 1, 1},  {0, 1, -1}, {1, 1, 1},
+                                    {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
+
+/* The view along a link: an affine map, sheared. `size`: its pixels. */
+static mat4 view_along(const struct gpu_frame *frame, const int link[3], int size[2])
+{
+    /* As links.frag.glsl: a little aside, lest a surface lie at cells' centres. */
+    static const double aside[3] = {1.3e-4, 1.7e-4, 2.1e-4};
+    const float *lower = &frame->field_lower.x;
+    const int *dims = &frame->field_dims.x;
+    const double per_m = 1.0 / (double)frame->field_lower.w;
+    const int axis = link[0] ? 0 : (link[1] ? 1 : 2);
+    mat4 view = {{0}};
+    double origin[3]; /* in cells, where the world's origin is */
+    for (int i = 0; i < 3; ++i)
+        origin[i] = -(double)lower[i] * per_m - 0.5 + aside[i];
+    for (int row = 0; row < 2; ++row) {
+        const int other = (axis + 1 + row) % 3;
+        /* pixel = q[other] - link[other] q[axis], moved to begin with 0 */
+        const int before = link[other] > 0 ? dims[axis] : 0;
+        size[row] = dims[other] + (link[other] ? dims[axis] : 0);
+        const double scale = 2.0 / (double)size[row];
+        view.m[4 * other + row] = (float)(scale * per_m);
+        view.m[4 * axis + row] = (float)(-scale * per_m * (double)link[other]);
+        view.m[12 + row] = (float)(scale * (origin[other] - (double)link[other] * origin[axis] +
+                                            (double)before + 0.5) - 1.0);
+    }
+    const double depth = 1.0 / (double)(dims[axis] + 1);
+    view.m[4 * axis + 2] = (float)(depth * per_m);
+    view.m[12 + 2] = (float)(depth * (origin[axis] + 1.0));
+    view.m[15] = 1.0f;
+    return view;
+}
+
+static brume_result draw(struct lpv_work *work, GLuint framebuffer)
+{
+    const struct transport_input *input = work->input;
+    for (int i = 0; i < LINKS; ++i) {
+        int size[2];
+        const struct gpu_draw stage = {
+            .clip_from_world = view_along(input->frame, links[i], size),
+            .info = {0, (uint32_t)i, 0, 0}};
+        glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_WIDTH, size[0]);
+        glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_HEIGHT, size[1]);
+        glViewport(0, 0, size[0], size[1]);
+        TRY(geometry_draw(input->gpu, input->geometry, &stage, BRUME_VISIBLE_SHADOW,
+                          GEOMETRY_LINKS));
+    }
+    return BRUME_OK;
+}
+
+brume_result lpv_cut_links(struct lpv_work *work)
+{
+    static const uint32_t none;
+    glClearTexImage(work->links.id, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, &none);
+    glClearTexImage(work->walls.id, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, &none);
+    glBindImageTexture(SLOT_OUTPUT_LINKS, work->links.id, 0, GL_TRUE, 0, GL_READ_WRITE, GL_R32UI);
+    glBindImageTexture(SLOT_OUTPUT_WALLS, work->walls.id, 0, GL_TRUE, 0, GL_READ_WRITE, GL_R32UI);
+    GLuint framebuffer;
+    glCreateFramebuffers(1, &framebuffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    const brume_result result = draw(work, framebuffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glDeleteFramebuffers(1, &framebuffer);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    return result;
+}

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The light that was scattered or reflected, as the view takes it from its lattice.
+#include "lib/links.glsl"
+
+layout(binding = SLOT_FIELD) uniform sampler3D field_lattice; // as lpv_finish leaves it
+
+struct field_light
+{
+    vec3 fluence; // W/m^2
+    mat3 flux;    // columns: colours; where the light goes
+};
+
+bool field_exists()
+{
+    return frame.field_dims.w != 0;
+}
+
+// Whether a surface cuts the link from a cell with those cut links, by the offset to its neighbour.
+bool is_cut(vec2 cuts, ivec3 offset)
+{
+    for (int i = 0; i < 13; ++i) {
+        if (LINKS[i] == offset)
+            return (uint(cuts.x) >> i & 1u) != 0u;
+        if (LINKS[i] == -offset)
+            return (uint(cuts.y) >> i & 1u) != 0u;
+    }
+    return false;
+}
+
+// Interpolated between the eight cells around a point, but for those that a surface parts from the
+// cell that it is in, and those not before the plane (xyz: normal, w: the product with its points).
+field_light field_between(vec3 p, vec4 plane)
+{
+    vec3 at = (p - frame.field_lower.xyz) / frame.field_lower.w - 0.5;
+    ivec3 last = frame.field_dims.xyz - 1;
+    ivec3 home = clamp(ivec3(round(at)), ivec3(0), last);
+    vec2 cuts = texelFetch(field_lattice, home + ivec3(3 * frame.field_dims.x, 0, 0), 0).xy;
+    ivec3 low = ivec3(floor(at));
+    vec3 f = at - vec3(low);
+    field_light light = field_light(vec3(0.0), mat3(0.0));
+    float sum = 0.0;
+    for (int corner = 0; corner < 8; ++corner) {
+        ivec3 side = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
+        ivec3 cell = clamp(low + side, ivec3(0), last);
+        vec3 each = mix(1.0 - f, f, vec3(side));
+        float weight = each.x * each.y * each.z;
+        if (weight <= 0.0 || is_cut(cuts, cell - home) ||
+            dot(cell_centre(cell), plane.xyz) < plane.w)
+            continue;
+        sum += weight;
+        for (int c = 0; c < 3; ++c) {
+            vec4 texel = texelFetch(field_lattice, cell + ivec3(c * frame.field_dims.x, 0, 0), 0);
+            light.fluence[c] += weight * texel.x;
+            light.flux[c] += weight * texel.yzw;
+        }
+    }
+    if (sum > 0.0) {
+        light.fluence /= sum;
+        light.flux /= sum;
+    }
+    return light;
+}
+
+// The field ends where its lattice does.
+bool field_reaches(vec3 p)
+{
+    vec3 at = (p - frame.field_lower.xyz) / frame.field_lower.w;
+    return all(greaterThan(at, vec3(0.0))) && all(lessThan(at, vec3(frame.field_dims.xyz)));
+}
+
+// Radiance that a medium's point scatters towards a direction, per unit of sigma_s: bands 0 and 1
+// of the light times those of the phase function.
+vec3 field_scatter(vec3 p, vec3 out_direction, float g)
+{
+    if (!field_reaches(p))
+        return vec3(0.0);
+    field_light light = field_between(p, vec4(0.0, 0.0, 0.0, -1.0));
+    return max(light.fluence + 3.0 * g * (out_direction * light.flux), vec3(0.0)) / (4.0 * PI);
+}
+
+// At a surface: light of bands 0 and 1 as it is before it, and the irradiance by it.
+field_light field_before(vec3 p, vec3 normal)
+{
+    float reach = 0.5 * frame.field_lower.w * (abs(normal.x) + abs(normal.y) + abs(normal.z));
+    return field_between(p + normal * reach, vec4(normal, dot(normal, p)));
+}
+
+vec3 field_irradiance(field_light light, vec3 normal)
+{
+    return max(0.25 * light.fluence - 0.5 * (normal * light.flux), vec3(0.0));
+}
+
+// Radiance that arrives from a direction.
+vec3 field_radiance(field_light light, vec3 towards)
+{
+    return max(light.fluence - 3.0 * (towards * light.flux), vec3(0.0)) / (4.0 * PI);
+}

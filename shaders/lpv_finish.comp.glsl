@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The field as the view wants it: a texture four times as wide as the lattice, with each colour's
+// fluence and flux, and last which links are cut, forwards and backwards.
+#version 450 core
+#include "lib/links.glsl"
+
+layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
+
+layout(binding = SLOT_FLOW) uniform sampler3D sums[3];
+layout(binding = SLOT_LINKS) uniform usampler3D links;
+
+layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D field_image;
+
+void main()
+{
+    ivec3 cell = ivec3(gl_GlobalInvocationID);
+    if (!in_field(cell))
+        return;
+    uint forwards = texelFetch(links, cell, 0).r, backwards = 0u;
+    for (int i = 0; i < 13; ++i) {
+        ivec3 before = cell - LINKS[i];
+        if (in_field(before) && (texelFetch(links, before, 0).r >> i & 1u) != 0u)
+            backwards |= 1u << i;
+    }
+    ivec3 texel = cell;
+    for (int c = 0; c < 3; ++c, texel.x += frame.field_dims.x)
+        imageStore(field_image, texel, texelFetch(sums[c], cell, 0));
+    imageStore(field_image, texel, vec4(float(forwards), float(backwards), 0.0, 0.0));
+}

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One point a texel of a reflective shadow map: the light that the surface there reflects, into the
+// cell half a cell before it, lest it light itself (LPV, sec. 4.2; Kaplanyan and Dachsbacher,
+// "Cascaded Light Propagation Volumes for Real-time Indirect Illumination", I3D 2010, sec. 3.1).
+#version 450 core
+#include "lib/transmittance.glsl"
+#include "lib/shadow.glsl"
+#include "lib/links.glsl"
+
+layout(std140, binding = SLOT_STAGE) uniform stage_block
+{
+    gpu_reflection stage;
+};
+
+layout(binding = SLOT_RSM) uniform sampler2D rsm[3]; // position, normal, reflectance
+
+flat out vec3 power;
+flat out vec3 axis;
+
+// Power that the light sends through a texel, W.
+vec3 texel_power(vec3 p, out vec3 towards)
+{
+    gpu_light_sample s = light_samples[stage.what.y];
+    float area = stage.scale.x * stage.scale.x;
+    if (stage.what.x < 0) {
+        towards = s.position.xyz;
+        vec3 tau = fog_tau(p, towards, 1e30);
+        if (medium_exists())
+            tau += medium_tau(p, towards, 1e30, 2.0 * frame.medium_lower.w, 0.5);
+        return s.weight.rgb * exp(-tau) * area;
+    }
+    gpu_light light = lights[stage.what.x];
+    float square;
+    vec3 intensity = light_intensity(light, s.position.xyz, p, towards, square) * light.factors.x;
+    if (light.info.x == uint(LIGHT_SUN))
+        return intensity * area * light_transmittance(light, p, towards, 1e30);
+    if (shadow_face(light, p - s.position.xyz) != stage.what.z)
+        return vec3(0.0); // faces reach a little into one another
+    // A plane's texel at 1 m before the eye fills texel^2 cos^3 of solid angle.
+    float distance = sqrt(square);
+    float cosine = (stage.clip_from_world * vec4(p, 1.0)).w / distance;
+    return intensity * (area * cosine * cosine * cosine) *
+           light_transmittance(light, p, towards, distance);
+}
+
+void main()
+{
+    power = axis = vec3(0.0);
+    gl_Position = vec4(0.0, 0.0, 2.0, 1.0); // nowhere
+    ivec2 texel = ivec2(gl_VertexID % stage.what.w, gl_VertexID / stage.what.w);
+    vec4 position = texelFetch(rsm[0], texel, 0);
+    if (position.w == 0.0)
+        return;
+    vec3 towards;
+    vec3 p = position.xyz;
+    power = texel_power(p, towards) * stage.scale.y * texelFetch(rsm[2], texel, 0).rgb;
+    axis = texelFetch(rsm[1], texel, 0).xyz;
+    if (dot(axis, towards) < 0.0)
+        axis = -axis; // both sides of a surface are the same
+    float reach = 0.5 * frame.field_lower.w * (abs(axis.x) + abs(axis.y) + abs(axis.z));
+    ivec3 cell = ivec3(floor((p + axis * reach - frame.field_lower.xyz) / frame.field_lower.w));
+    if (!in_field(cell))
+        return;
+    ivec3 dims = frame.field_dims.xyz;
+    int row = stage.tiles.x;
+    vec2 place = vec2(ivec2(cell.z % row, cell.z / row) * dims.xy + cell.xy) + 0.5;
+    gl_Position = vec4(place / vec2(dims.xy * ivec2(row, (dims.z + row - 1) / row)) * 2.0 - 1.0, 0.5,
+                       1.0);
+}

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The light that propagation begins with: of every cell, what its medium scatters of the lights' own
+// light, and what its surfaces reflect of it. Gathered by the cell rather than strewn along the
+// lights' rays, so that many rays through one cell cost no more than one.
+#version 450 core
+#include "lib/transmittance.glsl"
+#include "lib/shadow.glsl"
+#include "lib/sky.glsl"
+#include "lib/flow.glsl"
+
+layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
+
+layout(std140, binding = SLOT_STAGE) uniform stage_block
+{
+    gpu_lattice_pass stage; // offset.x: 0 leaves the media out; y: tiles in a row of the surfaces'
+};
+
+layout(binding = SLOT_REFLECTED) uniform sampler2D reflected[3];
+
+layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D flow_image[3];
+
+const int SAMPLES = 2; // along a side
+
+// What the media scatter at a point, of the light of all lights.
+void add_scattered(inout vec4 flow[3], vec3 p, float volume, float side, uint lot)
+{
+    vec3 sigma_s = vec3(0.0);
+    float g = 0.0;
+    bool fog = fog_exists() && all(greaterThanEqual(p, frame.fog_lower.xyz)) &&
+               all(lessThanEqual(p, frame.fog_upper.xyz));
+    if (medium_exists() && all(greaterThanEqual(p, frame.medium_lower.xyz)) &&
+        all(lessThanEqual(p, frame.medium_upper.xyz))) {
+        vec4 scatter = textureLod(medium_scatter, medium_coordinate(p), 0.0);
+        sigma_s = scatter.rgb;
+        g = scatter.a;
+    }
+    if (fog) {
+        float here = luminance(sigma_s), there = luminance(frame.fog_sigma_s.rgb);
+        g = (here * g + there * frame.fog_sigma_s.w) / max(here + there, 1e-30);
+        sigma_s += frame.fog_sigma_s.rgb;
+    }
+    if (sigma_s == vec3(0.0))
+        return;
+    for (uint i = 0u; i < frame.counts.x; ++i) {
+        gpu_light light = lights[i];
+        gpu_light_sample s = light_samples[light.samples.x + lot % light.samples.y];
+        vec3 towards;
+        float square;
+        vec3 intensity = light_intensity(light, s.position.xyz, p, towards, square);
+        bool sun = light.info.x == uint(LIGHT_SUN);
+        float distance = sun ? 1e30 : sqrt(square);
+        if (intensity == vec3(0.0))
+            continue;
+        intensity *= light_shadow_medium(light, s, p, distance) * light.factors.z;
+        if (intensity == vec3(0.0))
+            continue;
+        // A lamp's own cell has its mean, not the peak at the lamp.
+        if (!sun)
+            intensity /= max(square, 0.06 * side * side);
+        vec3 power = intensity * light_transmittance(light, p, towards, distance) * sigma_s * volume;
+        for (int c = 0; c < 3; ++c)
+            flow[c] += power[c] * vec4(1.0, -g * towards);
+    }
+    if (frame.sky_dims.w != 0) {
+        vec3 uvw = sky_coordinate(p);
+        vec4 scattered = volume * vec4(1.0, vec3(g));
+        flow[0] += sigma_s.r * scattered * textureLod(sky_r, uvw, 0.0);
+        flow[1] += sigma_s.g * scattered * textureLod(sky_g, uvw, 0.0);
+        flow[2] += sigma_s.b * scattered * textureLod(sky_b, uvw, 0.0);
+    }
+}
+
+void main()
+{
+    ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
+    if (!in_field(cell) || cell.z >= stage.slab.w)
+        return;
+    float side = frame.field_lower.w;
+    ivec2 tile = ivec2(cell.z % stage.offset.y, cell.z / stage.offset.y);
+    ivec2 texel = tile * frame.field_dims.xy + cell.xy;
+    vec4 flow[3];
+    for (int c = 0; c < 3; ++c)
+        flow[c] = texelFetch(reflected[c], texel, 0);
+    if (stage.offset.x != 0) {
+        uint start = hash(uint(cell.x) + hash(uint(cell.y) + hash(uint(cell.z))));
+        float part = side / float(SAMPLES);
+        for (uint i = 0u; i < uint(SAMPLES * SAMPLES * SAMPLES); ++i) {
+            uint a = hash(start + 3u * i), b = hash(a), c = hash(b);
+            vec3 jitter = vec3(a, b, c) * (1.0 / 4294967296.0);
+            vec3 p = frame.field_lower.xyz + vec3(cell) * side +
+                     (vec3(i & 1u, i >> 1u & 1u, i >> 2u) + jitter) * part;
+            add_scattered(flow, p, part * part * part, side, start + i);
+        }
+    }
+    for (int c = 0; c < 3; ++c)
+        imageStore(flow_image[c], cell, leaving_all(flow[c]));
+}

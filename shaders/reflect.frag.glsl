@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A reflective shadow map (Dachsbacher and Stamminger, "Reflective Shadow Maps", I3D 2005): where
+// the light's rays meet surfaces, how those stand, and what they reflect.
+#version 450 core
+#include "lib/material.glsl"
+
+in vec3 world_position;
+in vec3 world_normal;
+in vec2 uv;
+flat in uint material_number;
+flat in uint instance_number;
+
+layout(location = 0) out vec4 out_position; // w: 1
+layout(location = 1) out vec4 out_normal;
+layout(location = 2) out vec4 out_diffuse;
+
+void main()
+{
+    gpu_material material = materials[material_number];
+    vec4 base = material_base(material, uv);
+    float alpha = material_shadow_alpha(material, material_alpha(material, base));
+    if (!material_covers(material, alpha, gl_FragCoord.xy, instance_number, stage.info.x))
+        discard;
+    out_position = vec4(world_position, 1.0);
+    out_normal = vec4(world_normal * inversesqrt(max(dot(world_normal, world_normal), 1e-30)), 0.0);
+    out_diffuse = vec4(material.diffuse.rgb * base.rgb, 0.0);
+}

@@ -438,6 +438,26 @@ typedef enum brume_depths {
     BRUME_DEPTHS_COUNT = 5
 } brume_depths;
 
+/* What of the light is shown: all, or for comparison the parts that "Light Propagation Volumes with
+ * scattering" sets side by side in its Figure 5. LPV alone knows others than the first. */
+typedef enum brume_light_paths {
+    BRUME_PATHS_ALL = 0,
+    BRUME_PATHS_DIRECT = 1,          /* surfaces, straight from the lights */
+    BRUME_PATHS_REFLECTED = 2,       /* 1, and what surfaces reflect to one another */
+    BRUME_PATHS_SINGLE = 3,          /* 1, and what media scatter once */
+    BRUME_PATHS_REFLECTED_MARCHED = 4, /* 2, and what media scatter of that to the camera */
+    BRUME_PATHS_SUM = 5,             /* 3 and 4 added up: what media scatter lights nothing */
+    BRUME_PATHS_COUNT = 6
+} brume_light_paths;
+
+/* How LPV's lattice knows of the surfaces that stand in the light's way. */
+typedef enum brume_blockers {
+    BRUME_BLOCKERS_LINKS = 0,        /* links between cells that a surface cuts, exactly */
+    BRUME_BLOCKERS_FUZZY = 1,        /* for comparison, as the paper: from what lights, camera and six
+                                        views from outside see, as spherical harmonics a cell */
+    BRUME_BLOCKERS_COUNT = 2
+} brume_blockers;
+
 typedef struct brume_settings {
     uint32_t method;
     int32_t medium_resolution;       /* cells along the longest side; 0: 128 */
@@ -448,7 +468,10 @@ typedef struct brume_settings {
     int32_t world_samples;           /* directions that stand for the world's light; 0: 128 */
     float step;                      /* march step in cells of the medium; 0: 1 */
     uint32_t depths;                 /* brume_depths */
-    uint32_t reserved;
+    uint32_t light_paths;            /* brume_light_paths */
+    uint32_t blockers;               /* brume_blockers */
+    uint32_t cascades;               /* LPV: lattices one within another, each with cells half as
+                                        large as the one around it; 0: 1, at most 3 */
     uint64_t memory_budget;          /* bytes on the GPU; 0: 2 GiB */
 } brume_settings;
 
@@ -486,6 +509,8 @@ typedef struct brume_view {
     uint32_t urgent;                 /* 1: served before all jobs that are not: somebody waits */
     uint32_t world_draws;            /* of the world's directions, how many a pixel takes in all its
                                         samples: fewer are quicker and grainier; 0: 64 */
+    uint32_t half_march;             /* 1: light in media at half the resolution, fitted to edges of
+                                        surfaces: about four times as quick, and softer */
 } brume_view;
 
 typedef enum brume_stage {

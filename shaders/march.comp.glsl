@@ -188,14 +188,14 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
         end = k + 1;
         vec3 through = exp(-m.sigma_t * dt);
         vec3 weight = transmittance * step_weight(m.sigma_t, through, dt);
-        if (frame.sky_dims.w != 0) {
+        if (frame.sky_dims.w != 0 && frame.paths.x != 0) {
             if (t >= sky_next) {
                 sky = sky_scatter(ray.origin + ray.direction * t, -ray.direction, m.g);
                 sky_next = t + sky_every;
             }
             state.direct += weight * m.sigma_s * sky;
         }
-        if (field_exists()) {
+        if (field_exists() && frame.paths.y != 0) {
             if (t >= field_next) {
                 field = field_scatter(ray.origin + ray.direction * t, -ray.direction, m.g);
                 field_next = t + field_every;
@@ -209,7 +209,7 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             break;
         }
     }
-    if (first < end)
+    if (first < end && frame.paths.x != 0)
         for (uint i = 0u; i < frame.counts.x; ++i)
             state.direct += march_lamp(i, state.transmittance, ray, span.x, dt, first, end,
                                        in_lattice, pixel, jitter);

@@ -33,6 +33,9 @@ PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONME
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3, 3)
 STAGES = ("upload", "medium", "shadow", "transport", "gbuffer", "shade", "march", "passes")
 METHODS = {"OPV": 0, "LPV": 1}
+LIGHT_PATHS = {"ALL": 0, "DIRECT": 1, "REFLECTED": 2, "SINGLE": 3, "REFLECTED_MARCHED": 4,
+               "SUM": 5}
+BLOCKERS = {"LINKS": 0, "FUZZY": 1}
 DEPTHS = {"PROPAGATED": 0, "MARCHED": 1, "CORRECTED": 2, "PAPER": 3, "ITERATED": 4}
 KINDS = {"mesh": 0, "instances": 1, "material": 2, "image": 3, "light": 4, "volume": 5}
 JOB_QUEUED, JOB_RUNNING, JOB_DONE, JOB_FAILED, JOB_CANCELLED = range(5)
@@ -156,7 +159,8 @@ class Settings(Structure):
                 ("lattice_resolution", c_int32), ("iterations", c_int32),
                 ("shadow_resolution", c_int32), ("light_samples", c_int32),
                 ("world_samples", c_int32), ("step", c_float), ("depths", c_uint32),
-                ("reserved", c_uint32), ("memory_budget", c_uint64)]
+                ("light_paths", c_uint32), ("blockers", c_uint32), ("cascades", c_uint32),
+                ("memory_budget", c_uint64)]
 
 
 class View(Structure):
@@ -164,7 +168,7 @@ class View(Structure):
                 ("clip_from_view", Mat4), ("clip_near", c_float), ("clip_far", c_float),
                 ("samples", c_uint32), ("seed", c_uint32), ("filter_width", c_float),
                 ("film_transparent", c_uint32), ("passes", c_uint32), ("progressive", c_uint32),
-                ("urgent", c_uint32), ("world_draws", c_uint32)]
+                ("urgent", c_uint32), ("world_draws", c_uint32), ("half_march", c_uint32)]
 
 
 class StageStats(Structure):

@@ -163,6 +163,18 @@ static void set_world(struct run *run)
     glBindTextureUnit(SLOT_WORLD, image ? image->texture.id : 0);
 }
 
+/* Of all light, what the settings want. */
+static void set_paths(struct run *run)
+{
+    const uint32_t paths = run->request->settings.light_paths;
+    const int all = paths == BRUME_PATHS_ALL, sum = paths == BRUME_PATHS_SUM;
+    run->renderer->frame.paths = (ivec4){
+        .x = all || sum || paths == BRUME_PATHS_SINGLE,
+        .y = all || sum || paths == BRUME_PATHS_REFLECTED_MARCHED,
+        .z = paths != BRUME_PATHS_DIRECT && paths != BRUME_PATHS_SINGLE,
+    };
+}
+
 static brume_result bind_frame(struct run *run)
 {
     struct renderer *renderer = run->renderer;
@@ -304,6 +316,7 @@ static brume_result bind_view(struct run *run, int end)
     const struct render_request *request = run->request;
     const float cell = renderer->medium.dims[0] ? renderer->medium.cell : 1.0f;
     set_world(run);
+    set_paths(run);
     renderer->frame.march = (vec4){cell * request->settings.step, FOG_STEPS, (float)request->row,
                                    (float)end};
     view_frame(&request->view, request->sample, &renderer->frame);
@@ -499,8 +512,11 @@ static brume_result run_stages(struct run *run)
                                   least(shares->sky, lattice_sky_bytes(settings)),
                                   least(shares->field, lattice_field_bytes(settings)),
                                   (uint64_t)settings->iterations,
+                                  settings->light_paths == BRUME_PATHS_ALL,
+                                  settings->blockers,
+                                  settings->cascades,
                                   float_bits(snapshot->world.reach)};
-    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 10, work_transport));
+    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 13, work_transport));
     collect_warnings(run);
     return BRUME_OK;
 }

@@ -212,7 +212,7 @@ brume_result lpv_run(struct transport *transport, const struct transport_input *
     struct lpv_work work = {
         .input = input,
         .passes = {.input = input, .done = 1.0f, .share = 0.5f},
-        .media = true,
+        .media = input->settings->light_paths == BRUME_PATHS_ALL,
     };
     const brume_result result = find(&work, transport);
     finish(&work);

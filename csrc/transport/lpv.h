@@ -22,7 +22,7 @@ struct lpv_work {
     struct texture reflected[3];    /* what surfaces reflect first, the lattice's layers as tiles */
     int tiles;                      /* of these in a row */
     struct buffer powers;           /* in flight, a group of the last iteration */
-    bool media;                     /* 0: the lattice knows surfaces alone */
+    bool media;                     /* false: the lattice knows surfaces alone */
 };
 
 /* Links that surfaces cut, and what these reflect, into work->links and walls. */

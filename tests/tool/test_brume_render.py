@@ -144,7 +144,8 @@ def test_passes(run, smoke, tmp_path):
     assert done.returncode == 0, done.stderr
     picture = openexr.read(tmp_path / "a.exr")
     layers = {name.rpartition(".")[0] for name in picture}
-    assert layers == {"", "Depth", "Normal", "VolumeDir", "Emit", "Env", "Transmittance"}
+    assert layers == {"", "Depth", "Normal", "VolumeDir", "Emit", "Env", "Transmittance",
+                      "VolumeInd"}
     through = np.stack([picture[f"Transmittance.{name}"] for name in COLOR])
     assert through.min() >= 0.0 and through.max() <= 1.0 + 1e-6
     assert through[:, 16, 24].max() < 0.5  # 1.8 m of 4/m, no less than that at the middle

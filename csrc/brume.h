@@ -546,6 +546,9 @@ typedef struct brume_stats {
     uint32_t lights_propagated;  /* lamps whose light was carried through the medium anew */
     uint32_t sky_propagated;     /* how often the world's was */
     uint32_t iterations;         /* of scattered and reflected light, by this job */
+    double power_begun;          /* W of all colours: what these began with, */
+    double power_in_flight;      /* and what the last one left that had not left the lattice or been
+                                    absorbed */
 } brume_stats;
 
 typedef struct brume_job brume_job;

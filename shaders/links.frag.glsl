@@ -42,8 +42,8 @@ void main()
     float along = floor(at[axis]);
     ivec3 cell = ivec3(round(at - (at[axis] - along) * vec3(link)));
     cell[axis] = int(along);
-    if (in_field(cell))
-        imageAtomicOr(links_image, cell, 1u << stage.info.y);
+    if (in_links(cell))
+        imageAtomicOr(links_image, links_texel(cell), 1u << stage.info.y);
     vec3 reflectance = material.diffuse.rgb * base.rgb;
     add_wall(cell, reflectance);
     add_wall(cell + link, reflectance);

@@ -16,12 +16,9 @@ void main()
     ivec3 cell = ivec3(gl_GlobalInvocationID);
     if (!in_field(cell))
         return;
-    uint forwards = texelFetch(links, cell, 0).r, backwards = 0u;
-    for (int i = 0; i < 13; ++i) {
-        ivec3 before = cell - LINKS[i];
-        if (in_field(before) && (texelFetch(links, before, 0).r >> i & 1u) != 0u)
-            backwards |= 1u << i;
-    }
+    uint forwards = texelFetch(links, links_texel(cell), 0).r, backwards = 0u;
+    for (int i = 0; i < 13; ++i)
+        backwards |= texelFetch(links, links_texel(cell - LINKS[i]), 0).r & 1u << i;
     ivec3 texel = cell;
     for (int c = 0; c < 3; ++c, texel.x += frame.field_dims.x)
         imageStore(field_image, texel, texelFetch(sums[c], cell, 0));

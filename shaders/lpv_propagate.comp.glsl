@@ -9,7 +9,7 @@ layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GR
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
-    gpu_lattice_pass stage; // offset.x: 1 sums what is in flight; y: 0 lets surfaces reflect nothing
+    gpu_lattice_pass stage; // offset.x: 1 sums what is in flight
 };
 
 layout(binding = SLOT_FLOW) uniform sampler3D flow_before[3];
@@ -21,12 +21,7 @@ layout(binding = SLOT_LINKS) uniform usampler3D links;
 layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D flow_image[3];
 layout(binding = SLOT_OUTPUT_FIELD, rgba32f) uniform image3D field_image[3];
 
-layout(std430, binding = SLOT_POWERS) writeonly buffer powers_block
-{
-    float powers[]; // in flight, of all colours, a group
-};
-
-shared float group_powers[GROUP_LANES * GROUP_CELLS * GROUP_CELLS];
+#include "lib/power.glsl"
 
 struct half_way
 {
@@ -68,14 +63,13 @@ vec3 leave(ivec3 cell, int class_, vec3 direction)
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
-    bool inside = in_field(cell) && cell.z < stage.slab.w;
     vec3 in_flight = vec3(0.0);
-    if (inside) {
+    if (in_field(cell) && cell.z < stage.slab.w) {
         float side = frame.field_lower.w;
         vec3 extinct = texelFetch(cell_extinct, cell, 0).rgb;
         vec3 albedo = texelFetch(cell_albedo, cell, 0).rgb;
-        vec3 wall = stage.offset.y != 0 ? texelFetch(cell_walls, cell, 0).rgb : vec3(0.0);
-        uint own_links = texelFetch(links, cell, 0).r;
+        vec3 wall = texelFetch(cell_walls, cell, 0).rgb;
+        uint own_links = texelFetch(links, links_texel(cell), 0).r;
         vec4 own[3];
         for (int c = 0; c < 3; ++c)
             own[c] = texelFetch(flow_before[c], cell, 0);
@@ -96,8 +90,7 @@ void main()
             sum.passed += out_ * mine.mean;
             add_flux(sum.passed_flux, out_ * mine.mean, direction);
 
-            uint cut = number < 13 ? own_links >> i
-                                   : (there ? texelFetch(links, beyond, 0).r >> i : 0u);
+            uint cut = (number < 13 ? own_links : texelFetch(links, links_texel(beyond), 0).r) >> i;
             vec3 begins;
             float cosine = 1.0; // the mean, of a lobe, to its axis
             if ((cut & 1u) != 0u) {
@@ -124,19 +117,6 @@ void main()
         }
         in_flight = sum.power;
     }
-    if (stage.offset.x == 0)
-        return;
-    uint lane = gl_LocalInvocationIndex;
-    group_powers[lane] = in_flight.r + in_flight.g + in_flight.b;
-    for (uint half_ = uint(GROUP_LANES * GROUP_CELLS * GROUP_CELLS) / 2u; half_ > 0u; half_ /= 2u) {
-        barrier();
-        if (lane < half_)
-            group_powers[lane] += group_powers[lane + half_];
-    }
-    if (lane == 0u) {
-        uvec3 groups = gl_NumWorkGroups;
-        uint layer = gl_WorkGroupID.z + uint(stage.slab.z) / uint(GROUP_CELLS);
-        powers[(layer * groups.y + gl_WorkGroupID.y) * groups.x + gl_WorkGroupID.x] =
-            group_powers[0];
-    }
+    if (stage.offset.x != 0)
+        sum_power(in_flight.r + in_flight.g + in_flight.b);
 }

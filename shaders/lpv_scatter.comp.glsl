@@ -19,11 +19,22 @@ layout(binding = SLOT_REFLECTED) uniform sampler2D reflected[3];
 
 layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D flow_image[3];
 
+#include "lib/power.glsl"
+
 const int SAMPLES = 2; // along a side
 
-// What the media scatter at a point, of the light of all lights.
-void add_scattered(inout vec4 flow[3], vec3 p, float volume, float side, uint lot)
+// The mean of 1/d^2 over a cube of that side around a point, to the second order (its Laplacian is
+// 2/d^4), and no more than over a cube around the lamp itself.
+float mean_inverse_square(float square, float side)
 {
+    float s = side * side;
+    return min((1.0 + s / (12.0 * square)) / square, 7.7 / s);
+}
+
+// What the media scatter in a cube of side `part` around a point, of the light of all lights.
+void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
+{
+    float volume = part * part * part;
     vec3 sigma_s = vec3(0.0);
     float g = 0.0;
     bool fog = fog_exists() && all(greaterThanEqual(p, frame.fog_lower.xyz)) &&
@@ -54,9 +65,8 @@ void add_scattered(inout vec4 flow[3], vec3 p, float volume, float side, uint lo
         intensity *= light_shadow_medium(light, s, p, distance) * light.factors.z;
         if (intensity == vec3(0.0))
             continue;
-        // A lamp's own cell has its mean, not the peak at the lamp.
         if (!sun)
-            intensity /= max(square, 0.06 * side * side);
+            intensity *= mean_inverse_square(square, part);
         vec3 power = intensity * light_transmittance(light, p, towards, distance) * sigma_s * volume;
         for (int c = 0; c < 3; ++c)
             flow[c] += power[c] * vec4(1.0, -g * towards);
@@ -70,11 +80,9 @@ void add_scattered(inout vec4 flow[3], vec3 p, float volume, float side, uint lo
     }
 }
 
-void main()
+// All that a cell begins with, and its power.
+float begin(ivec3 cell)
 {
-    ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
-    if (!in_field(cell) || cell.z >= stage.slab.w)
-        return;
     float side = frame.field_lower.w;
     ivec2 tile = ivec2(cell.z % stage.offset.y, cell.z / stage.offset.y);
     ivec2 texel = tile * frame.field_dims.xy + cell.xy;
@@ -85,13 +93,22 @@ void main()
         uint start = hash(uint(cell.x) + hash(uint(cell.y) + hash(uint(cell.z))));
         float part = side / float(SAMPLES);
         for (uint i = 0u; i < uint(SAMPLES * SAMPLES * SAMPLES); ++i) {
-            uint a = hash(start + 3u * i), b = hash(a), c = hash(b);
-            vec3 jitter = vec3(a, b, c) * (1.0 / 4294967296.0);
+            // No lots: what is turned by a right angle is lit alike.
             vec3 p = frame.field_lower.xyz + vec3(cell) * side +
-                     (vec3(i & 1u, i >> 1u & 1u, i >> 2u) + jitter) * part;
-            add_scattered(flow, p, part * part * part, side, start + i);
+                     (vec3(i & 1u, i >> 1u & 1u, i >> 2u) + 0.5) * part;
+            add_scattered(flow, p, part, start + i);
         }
     }
-    for (int c = 0; c < 3; ++c)
+    float power = 0.0;
+    for (int c = 0; c < 3; ++c) {
         imageStore(flow_image[c], cell, leaving_all(flow[c]));
+        power += max(flow[c].x, 0.0);
+    }
+    return power;
+}
+
+void main()
+{
+    ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
+    sum_power(in_field(cell) && cell.z < stage.slab.w ? begin(cell) : 0.0);
 }

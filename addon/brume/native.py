@@ -184,7 +184,8 @@ class Stats(Structure):
                 ("transport_dims", Dims), ("light_count", c_uint32), ("triangle_count", c_uint32),
                 ("samples", c_uint32), ("shadow_maps_drawn", c_uint32),
                 ("lights_propagated", c_uint32), ("sky_propagated", c_uint32),
-                ("iterations", c_uint32)]
+                ("iterations", c_uint32), ("power_begun", c_double),
+                ("power_in_flight", c_double)]
 
 
 class JobStatus(Structure):

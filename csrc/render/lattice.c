@@ -147,16 +147,34 @@ uint64_t lattice_depth_bytes(const struct renderer *renderer, const brume_settin
            (1u << 20);
 }
 
+/* Half as fine as the lamps' lattice. What is scattered once more shows more of what the nodes cut off
+ * at the rim of thick media: where light goes on, not below 32. */
+static int sky_resolution(const brume_settings *settings, int resolution)
+{
+    const int half = resolution / 2 < 4 ? 4 : resolution / 2;
+    if (settings->method == BRUME_METHOD_OPV)
+        return half;
+    const int most = resolution < 32 ? resolution : 32;
+    return half < most ? most : half;
+}
+
 uint64_t lattice_sky_bytes(const brume_settings *settings)
 {
-    const uint64_t nodes = (uint64_t)settings->lattice_resolution / 2 + 7;
+    const uint64_t nodes =
+        (uint64_t)sky_resolution(settings, settings->lattice_resolution) + 7;
     return nodes * nodes * nodes * SKY_NODE_BYTES;
+}
+
+int lattice_wants_field(const brume_settings *settings)
+{
+    return settings->method == BRUME_METHOD_LPV && settings->light_paths != BRUME_PATHS_DIRECT &&
+           settings->light_paths != BRUME_PATHS_SINGLE;
 }
 
 uint64_t lattice_field_bytes(const brume_settings *settings)
 {
     const uint64_t cells = (uint64_t)settings->lattice_resolution;
-    return settings->method == BRUME_METHOD_LPV
+    return lattice_wants_field(settings)
                ? cells * cells * cells * (FIELD_CELL_BYTES + FIELD_WORKING_BYTES) + FIELD_FIXED_BYTES
                : 0;
 }
@@ -199,26 +217,26 @@ static struct box field_box(const struct renderer *renderer, const struct snapsh
     return box;
 }
 
-/* The box's lower corner does not lie at a cell's corner or centre: walls, which are often there,
- * should not either. */
+/* The box in the middle, and along its longest side nothing but it: walls, which are often its sides,
+ * are where cells end. */
 static void layout_field(struct renderer *renderer, const struct render_request *request)
 {
-    const float corner = 0.38f; /* of a cell, where the box begins */
     struct gpu_frame *frame = &renderer->frame;
     const brume_settings *settings = &request->settings;
     const struct box box = field_box(renderer, request->snapshot);
     frame->field_dims = (ivec4){0};
-    if (settings->method != BRUME_METHOD_LPV || box_is_empty(&box))
+    if (!lattice_wants_field(settings) || box_is_empty(&box))
         return;
     int resolution = settings->lattice_resolution < 2 ? 2 : settings->lattice_resolution;
     for (;; resolution = resolution * 3 / 4) {
-        const float cell = fmaxf(longest(&box), 1e-6f) / (float)(resolution - 1);
+        const float cell = fmaxf(longest(&box), 1e-6f) / ((float)resolution - 0.02f);
         int *dims = &frame->field_dims.x;
         float lower[3];
         uint64_t cells = 1;
         for (int i = 0; i < 3; ++i) {
-            dims[i] = (int)ceilf((box.upper[i] - box.lower[i]) / cell - 1e-3f) + 1;
-            lower[i] = box.lower[i] - corner * cell;
+            const int needed = (int)ceilf((box.upper[i] - box.lower[i]) / cell);
+            dims[i] = needed < 1 ? 1 : needed;
+            lower[i] = 0.5f * (box.lower[i] + box.upper[i] - (float)dims[i] * cell);
             cells *= (uint64_t)dims[i];
         }
         frame->field_lower = pack(lower, cell);
@@ -292,7 +310,7 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
             const vec4 low = frame->fog_lower, high = frame->fog_upper;
             box_join(&box, (float[3]){low.x, low.y, low.z}, (float[3]){high.x, high.y, high.z});
         }
-        int sky = resolution / 2 < 4 ? 4 : resolution / 2;
+        int sky = sky_resolution(settings, resolution);
         for (;; sky = sky * 3 / 4) {
             frame->sky_lower = pack(box.lower, nodes_of(&box, sky, &frame->sky_dims));
             if (texels_of(&frame->sky_dims) * SKY_NODE_BYTES <= renderer->shares.sky || sky <= 4)

@@ -6,12 +6,14 @@
 
 #include "render/renderer.h"
 
-/* Fills the lattice fields of renderer->frame, the tau tiles of the lights, renderer->tau_size.
- * Keeps the transport within its share of the budget, with a warning where that makes it coarser. */
+/* Whether light goes from cell to cell with these settings. */
+int lattice_wants_field(const brume_settings *settings);
 /* No lattice of these settings is larger. */
 uint64_t lattice_depth_bytes(const struct renderer *renderer, const brume_settings *settings);
 uint64_t lattice_sky_bytes(const brume_settings *settings);
 uint64_t lattice_field_bytes(const brume_settings *settings);
+/* Fills the lattice fields of renderer->frame, the tau tiles of the lights, renderer->tau_size.
+ * Keeps the transport within its share of the budget, with a warning where that makes it coarser. */
 brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
                             const struct render_request *request);
 

@@ -13,6 +13,17 @@
 /* Of the power that has flown in all, what may still be to come. */
 #define CONVERGED 0.005
 
+static int groups(int cells, int group)
+{
+    return (cells + group - 1) / group;
+}
+
+static uint32_t group_count(const ivec4 *dims)
+{
+    return (uint32_t)(groups(dims->x, GROUP_LANES) * groups(dims->y, GROUP_CELLS) *
+                      groups(dims->z, GROUP_CELLS));
+}
+
 static brume_result lattice_texture(struct lpv_work *work, struct texture *texture, GLenum format,
                                     int across, const char *label)
 {
@@ -37,7 +48,12 @@ static brume_result make(struct lpv_work *work)
                          GL_TEXTURE_2D, GL_RGBA32F, texture_side(work->tiles * dims.x),
                          texture_side(rows * dims.y), 1, 1, "reflected light"));
     }
-    TRY(lattice_texture(work, &work->links, GL_R32UI, 1, "cut links"));
+    TRY(buffer_init(&work->input->gpu->memory, &work->powers, FOR_TRANSPORT,
+                    group_count(&dims) * sizeof(float), NULL, "powers in flight"));
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_POWERS, work->powers.id);
+    TRY(texture_init(&work->input->gpu->memory, &work->links, FOR_TRANSPORT, GL_TEXTURE_3D,
+                     GL_R32UI, texture_side(dims.x + 2), texture_side(dims.y + 2),
+                     texture_side(dims.z + 2), 1, "cut links")); /* of the cells around, too */
     return lattice_texture(work, &work->walls, GL_R32UI, 4, "surfaces' reflectances");
 }
 
@@ -87,30 +103,6 @@ static brume_result fill_cells(struct lpv_work *work)
     return BRUME_OK;
 }
 
-static brume_result begin(struct lpv_work *work, struct transport *transport)
-{
-    static const float nothing[4];
-    transport_bind(transport); /* depths and sky, as OPV has just found them */
-    bind_textures(SLOT_REFLECTED, work->reflected);
-    bind_images(SLOT_OUTPUT, work->flow[0], GL_WRITE_ONLY, GL_RGBA32F);
-    TRY(over_lattice(work, "lpv_scatter", (ivec4){work->media, work->tiles, 0, 0}));
-    for (int c = 0; c < 3; ++c)
-        glClearTexImage(work->sums[c].id, 0, GL_RGBA, GL_FLOAT, nothing);
-    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
-    return BRUME_OK;
-}
-
-static int groups(int cells, int group)
-{
-    return (cells + group - 1) / group;
-}
-
-static uint32_t group_count(const ivec4 *dims)
-{
-    return (uint32_t)(groups(dims->x, GROUP_LANES) * groups(dims->y, GROUP_CELLS) *
-                      groups(dims->z, GROUP_CELLS));
-}
-
 /* What the last iteration left in flight, W of all colours. */
 static brume_result in_flight(struct lpv_work *work, double *power)
 {
@@ -124,6 +116,19 @@ static brume_result in_flight(struct lpv_work *work, double *power)
     for (uint32_t i = 0; i < count; ++i)
         *power += (double)parts[i];
     free(parts);
+    return BRUME_OK;
+}
+
+static brume_result begin(struct lpv_work *work)
+{
+    static const float nothing[4];
+    bind_textures(SLOT_REFLECTED, work->reflected);
+    bind_images(SLOT_OUTPUT, work->flow[0], GL_WRITE_ONLY, GL_RGBA32F);
+    TRY(over_lattice(work, "lpv_scatter", (ivec4){work->media, work->tiles, 0, 0}));
+    TRY(in_flight(work, &work->input->stats->power_begun));
+    for (int c = 0; c < 3; ++c)
+        glClearTexImage(work->sums[c].id, 0, GL_RGBA, GL_FLOAT, nothing);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     return BRUME_OK;
 }
 
@@ -149,26 +154,22 @@ static brume_result propagate(struct lpv_work *work)
     const int wanted = input->settings->iterations;
     const int most = wanted > 0 ? wanted : MOST_ITERATIONS;
     struct convergence so_far = {0};
-    const uint32_t count = group_count(&input->frame->field_dims);
-    TRY(buffer_init(&input->gpu->memory, &work->powers, FOR_TRANSPORT, count * sizeof(float), NULL,
-                    "powers in flight"));
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_POWERS, work->powers.id);
     glBindTextureUnit(SLOT_CELL_EXTINCT, work->cells[0].id);
     glBindTextureUnit(SLOT_CELL_ALBEDO, work->cells[1].id);
     glBindTextureUnit(SLOT_WALLS, work->cells[2].id);
     glBindTextureUnit(SLOT_LINKS, work->links.id);
     bind_images(SLOT_OUTPUT_FIELD, work->sums, GL_READ_WRITE, GL_RGBA32F);
     for (int i = 0; i < most; ++i) {
-        const bool look = wanted <= 0 && i % ITERATIONS_A_LOOK == ITERATIONS_A_LOOK - 1;
+        const bool look = i % ITERATIONS_A_LOOK == ITERATIONS_A_LOOK - 1 || i == most - 1;
         bind_textures(SLOT_FLOW, work->flow[i % 2]);
         bind_images(SLOT_OUTPUT, work->flow[(i + 1) % 2], GL_WRITE_ONLY, GL_RGBA32F);
-        TRY(over_lattice(work, "lpv_propagate", (ivec4){look, 1, 0, 0}));
+        TRY(over_lattice(work, "lpv_propagate", (ivec4){look, 0, 0, 0}));
         glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
         ++input->stats->iterations;
-        double power = 0.0;
-        if (look)
-            TRY(in_flight(work, &power));
-        if (look && converged(&so_far, power))
+        if (!look)
+            continue;
+        TRY(in_flight(work, &input->stats->power_in_flight));
+        if (wanted <= 0 && converged(&so_far, input->stats->power_in_flight))
             break;
     }
     return BRUME_OK;
@@ -193,11 +194,12 @@ static brume_result hand_over(struct lpv_work *work, struct transport *transport
 
 static brume_result find(struct lpv_work *work, struct transport *transport)
 {
+    transport_bind(transport); /* depths and sky, as OPV has just found them */
     TRY(make(work));
     TRY(lpv_cut_links(work));
     TRY(fill_cells(work));
     TRY(lpv_reflect(work));
-    TRY(begin(work, transport));
+    TRY(begin(work));
     TRY(propagate(work));
     return hand_over(work, transport);
 }

@@ -33,3 +33,15 @@ bool in_field(ivec3 cell)
 {
     return all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, frame.field_dims.xyz));
 }
+
+// The picture of cut links knows the cells around the lattice, too: links from there lead into it.
+bool in_links(ivec3 cell)
+{
+    return all(greaterThanEqual(cell, ivec3(-1))) &&
+           all(lessThanEqual(cell, frame.field_dims.xyz));
+}
+
+ivec3 links_texel(ivec3 cell)
+{
+    return cell + 1;
+}

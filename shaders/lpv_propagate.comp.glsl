@@ -9,7 +9,7 @@ layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GR
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
-    gpu_lattice_pass stage; // offset.x: 1 sums what is in flight
+    gpu_lattice_pass stage; // offset.x: 1 sums what is in flight; y: a float, what this iteration counts
 };
 
 layout(binding = SLOT_FLOW) uniform sampler3D flow_before[3];
@@ -108,10 +108,10 @@ void main()
             sum.passed += begins * mine.mean;
             add_flux(sum.passed_flux, begins * mine.mean, -cosine * direction);
         }
-        float volume = side * side * side;
+        float counts = intBitsToFloat(stage.offset.y) / (side * side * side);
         for (int c = 0; c < 3; ++c) {
             vec4 field = imageLoad(field_image[c], cell);
-            field += vec4(sum.passed[c], sum.passed_flux[c]) / volume;
+            field += vec4(sum.passed[c], sum.passed_flux[c]) * counts;
             imageStore(field_image[c], cell, field);
             imageStore(flow_image[c], cell, leaving_all(vec4(sum.power[c], sum.flux[c])));
         }

@@ -160,6 +160,8 @@ class SceneQuality:
         if level:
             settings.lattice_resolution = _halved(settings.lattice_resolution, level,
                                                   _COARSEST_LATTICE)
+            settings.field_resolution = _halved(settings.field_resolution, level,
+                                                _COARSEST_LATTICE)
             settings.shadow_resolution = _halved(settings.shadow_resolution, level,
                                                  _COARSEST_SHADOW)
             settings.light_samples = _halved(settings.light_samples, level, 1)

@@ -15,11 +15,11 @@ METHODS = [
 ]
 
 PRESETS = {
-    'DRAFT': {"samples": 4, "medium_resolution": 64, "lattice_resolution": 32, "step": 4.0,
+    'DRAFT': {"samples": 4, "medium_resolution": 64, "lattice_resolution": 32, "step": 4.0, "field_resolution": 16,
               "shadow_resolution": 256, "light_samples": 4, "world_samples": 32},
-    'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64, "step": 3.0,
+    'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64, "step": 3.0, "field_resolution": 32,
                 "shadow_resolution": 512, "light_samples": 8, "world_samples": 128},
-    'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96, "step": 1.0,
+    'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96, "step": 1.0, "field_resolution": 64,
               "shadow_resolution": 1024, "light_samples": 16, "world_samples": 256},
 }
 _DEFAULT = PRESETS['PREVIEW']
@@ -79,6 +79,13 @@ class BrumeSettings(bpy.types.PropertyGroup):
         description="Cells along the longest side of the lattice in which light travels. More "
                     "give sharper shadows of smoke on smoke; memory and time grow with the third "
                     "power, and with the number of lights")
+    field_resolution: IntProperty(
+        name="Scattering Resolution", update=changed,
+        default=_DEFAULT["field_resolution"], min=2, max=256, soft_max=128,
+        description="Cells along the longest side of the lattice in which light that was scattered "
+                    "or reflected goes on. It is soft: fewer do than for the lights' own. More tell "
+                    "smaller rooms and thicker smoke apart; memory grows with the third power, "
+                    "time with the fourth where iterations go on until they converged")
     depths: EnumProperty(
         name="Optical Depths", update=changed, default='PROPAGATED',
         description="How it is found what the volumes let through between each lamp and each cell",
@@ -95,8 +102,8 @@ class BrumeSettings(bpy.types.PropertyGroup):
     iterations: IntProperty(
         name="Iterations", update=changed,
         default=0, min=0, max=1024,
-        description="Steps of the methods that spread light cell by cell; 0 goes on until it "
-                    "converged. Single scattering has none")
+        description="How many cells far scattered and reflected light goes. 0 goes on until what is "
+                    "still to come no longer counts, which takes longest in closed bright rooms")
     shadow_resolution: IntProperty(
         name="Shadow Resolution", update=changed,
         default=_DEFAULT["shadow_resolution"], min=16, max=8192,
@@ -194,7 +201,8 @@ def native_settings(settings):
     return native.Settings(
         method=native.METHODS[settings.method],
         medium_resolution=settings.medium_resolution,
-        lattice_resolution=settings.lattice_resolution, iterations=settings.iterations,
+        lattice_resolution=settings.lattice_resolution,
+        field_resolution=settings.field_resolution, iterations=settings.iterations,
         shadow_resolution=settings.shadow_resolution, light_samples=settings.light_samples,
         world_samples=settings.world_samples, step=settings.step,
         depths=native.DEPTHS[settings.depths],

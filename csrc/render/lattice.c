@@ -173,7 +173,7 @@ int lattice_wants_field(const brume_settings *settings)
 
 uint64_t lattice_field_bytes(const brume_settings *settings)
 {
-    const uint64_t cells = (uint64_t)settings->lattice_resolution;
+    const uint64_t cells = (uint64_t)settings->field_resolution;
     return lattice_wants_field(settings)
                ? cells * cells * cells * (FIELD_CELL_BYTES + FIELD_WORKING_BYTES) + FIELD_FIXED_BYTES
                : 0;
@@ -227,7 +227,7 @@ static void layout_field(struct renderer *renderer, const struct render_request 
     frame->field_dims = (ivec4){0};
     if (!lattice_wants_field(settings) || box_is_empty(&box))
         return;
-    int resolution = settings->lattice_resolution < 2 ? 2 : settings->lattice_resolution;
+    int resolution = settings->field_resolution < 2 ? 2 : settings->field_resolution;
     for (;; resolution = resolution * 3 / 4) {
         const float cell = fmaxf(longest(&box), 1e-6f) / ((float)resolution - 0.02f);
         int *dims = &frame->field_dims.x;
@@ -246,10 +246,10 @@ static void layout_field(struct renderer *renderer, const struct render_request 
             resolution <= 4)
             break;
     }
-    if (resolution < settings->lattice_resolution)
+    if (resolution < settings->field_resolution)
         job_warn(request->control, "FIELD_COARSER",
                  "lattice of scattered light of %d instead of %d cells, to keep the memory budget",
-                 resolution, settings->lattice_resolution);
+                 resolution, settings->field_resolution);
 }
 
 brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,

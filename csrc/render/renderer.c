@@ -512,12 +512,13 @@ static brume_result run_stages(struct run *run)
                                   least(shares->sky, lattice_sky_bytes(settings)),
                                   least(shares->field, lattice_field_bytes(settings)),
                                   (uint64_t)settings->iterations,
+                                  (uint64_t)settings->field_resolution,
                                   lattice_wants_field(settings),
                                   settings->light_paths == BRUME_PATHS_ALL,
                                   settings->blockers,
                                   settings->cascades,
                                   float_bits(snapshot->world.reach)};
-    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 14, work_transport));
+    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 15, work_transport));
     collect_warnings(run);
     return BRUME_OK;
 }

@@ -10,8 +10,9 @@
 
 #define MOST_ITERATIONS 2000
 #define ITERATIONS_A_LOOK 4
-/* Of the power that has flown in all, what may still be to come. */
-#define CONVERGED 0.005
+/* Of the power that flies in all, what may be wrong of what is not waited for. */
+#define CONVERGED 0.003
+#define SMALL_REST 0.1
 
 static int groups(int cells, int group)
 {
@@ -132,20 +133,44 @@ static brume_result begin(struct lpv_work *work)
     return BRUME_OK;
 }
 
-/* Whether what is to come, as far as the last iterations tell, no longer counts. */
-struct convergence {
-    double before, flown;
+/* What is in flight falls, in the end, by the same ratio in every iteration, everywhere alike: the
+ * rest of the series is then known. */
+struct series {
+    double power, ratio, change; /* W in flight; an iteration's to that before it; its last change */
+    double flown;                /* W, all iterations together */
 };
 
-static bool converged(struct convergence *so_far, double power)
+/* Whether the rest is known well enough: not before it is a small part of all, for where it is must
+ * have settled, too; and then as far as the ratio has, which comes nearer to its end by a ratio of
+ * its own. */
+static bool settled(struct series *so_far, double power)
 {
     const double ratio =
-        so_far->before > 0.0 ? pow(power / so_far->before, 1.0 / ITERATIONS_A_LOOK) : 1.0;
-    so_far->before = power;
-    so_far->flown += power * ITERATIONS_A_LOOK;
+        so_far->power > 0.0 ? pow(power / so_far->power, 1.0 / ITERATIONS_A_LOOK) : 1.0;
+    const double change = fabs(ratio - so_far->ratio), left = 1.0 - ratio;
+    const double nearer = so_far->change > 0.0 ? fmin(change / so_far->change, 0.95) : 0.95;
+    const double to_come = change * nearer / (1.0 - nearer);
+    *so_far = (struct series){power, ratio, change, so_far->flown + power * ITERATIONS_A_LOOK};
     if (!(power > 0.0))
         return true;
-    return ratio < 1.0 && power * ratio / (1.0 - ratio) < CONVERGED * so_far->flown;
+    if (!(left > 0.0) || power / left > SMALL_REST * so_far->flown)
+        return false;
+    return power / left * fmin(to_come / left, 1.0) < CONVERGED * so_far->flown;
+}
+
+/* `counts`: what this iteration's light counts in the field. */
+static brume_result iterate(struct lpv_work *work, int number, bool look, double counts)
+{
+    const union {
+        float value;
+        int bits;
+    } times = {(float)counts};
+    bind_textures(SLOT_FLOW, work->flow[number % 2]);
+    bind_images(SLOT_OUTPUT, work->flow[(number + 1) % 2], GL_WRITE_ONLY, GL_RGBA32F);
+    TRY(over_lattice(work, "lpv_propagate", (ivec4){look, times.bits, 0, 0}));
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+    ++work->input->stats->iterations;
+    return look ? in_flight(work, &work->input->stats->power_in_flight) : BRUME_OK;
 }
 
 static brume_result propagate(struct lpv_work *work)
@@ -153,7 +178,7 @@ static brume_result propagate(struct lpv_work *work)
     const struct transport_input *input = work->input;
     const int wanted = input->settings->iterations;
     const int most = wanted > 0 ? wanted : MOST_ITERATIONS;
-    struct convergence so_far = {0};
+    struct series so_far = {0};
     glBindTextureUnit(SLOT_CELL_EXTINCT, work->cells[0].id);
     glBindTextureUnit(SLOT_CELL_ALBEDO, work->cells[1].id);
     glBindTextureUnit(SLOT_WALLS, work->cells[2].id);
@@ -161,16 +186,11 @@ static brume_result propagate(struct lpv_work *work)
     bind_images(SLOT_OUTPUT_FIELD, work->sums, GL_READ_WRITE, GL_RGBA32F);
     for (int i = 0; i < most; ++i) {
         const bool look = i % ITERATIONS_A_LOOK == ITERATIONS_A_LOOK - 1 || i == most - 1;
-        bind_textures(SLOT_FLOW, work->flow[i % 2]);
-        bind_images(SLOT_OUTPUT, work->flow[(i + 1) % 2], GL_WRITE_ONLY, GL_RGBA32F);
-        TRY(over_lattice(work, "lpv_propagate", (ivec4){look, 0, 0, 0}));
-        glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
-        ++input->stats->iterations;
-        if (!look)
-            continue;
-        TRY(in_flight(work, &input->stats->power_in_flight));
-        if (wanted <= 0 && converged(&so_far, input->stats->power_in_flight))
-            break;
+        TRY(iterate(work, i, look, 1.0));
+        if (look && wanted <= 0 && settled(&so_far, input->stats->power_in_flight))
+            /* The next iteration stands for all that would follow. */
+            return so_far.power > 0.0 ? iterate(work, i + 1, true, 1.0 / (1.0 - so_far.ratio))
+                                      : BRUME_OK;
     }
     return BRUME_OK;
 }

@@ -61,9 +61,5 @@ void main()
     ivec3 cell = ivec3(floor((p + axis * reach - frame.field_lower.xyz) / frame.field_lower.w));
     if (!in_field(cell))
         return;
-    ivec3 dims = frame.field_dims.xyz;
-    int row = stage.tiles.x;
-    vec2 place = vec2(ivec2(cell.z % row, cell.z / row) * dims.xy + cell.xy) + 0.5;
-    gl_Position = vec4(place / vec2(dims.xy * ivec2(row, (dims.z + row - 1) / row)) * 2.0 - 1.0, 0.5,
-                       1.0);
+    gl_Position = tiled_position(cell, frame.field_dims.xyz, stage.tiles.x);
 }

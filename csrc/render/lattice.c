@@ -153,11 +153,17 @@ uint64_t lattice_sky_bytes(const brume_settings *settings)
     return nodes * nodes * nodes * SKY_NODE_BYTES;
 }
 
+static uint64_t field_cell_bytes(const brume_settings *settings)
+{
+    return FIELD_CELL_BYTES + FIELD_WORKING_BYTES +
+           (settings->blockers == BRUME_BLOCKERS_FUZZY ? FIELD_FUZZY_BYTES : 0);
+}
+
 uint64_t lattice_field_bytes(const brume_settings *settings)
 {
     const uint64_t cells = (uint64_t)settings->lattice_resolution;
     return settings->method == BRUME_METHOD_LPV
-               ? cells * cells * cells * (FIELD_CELL_BYTES + FIELD_WORKING_BYTES) + FIELD_FIXED_BYTES
+               ? cells * cells * cells * field_cell_bytes(settings) + FIELD_FIXED_BYTES
                : 0;
 }
 
@@ -223,8 +229,7 @@ static void layout_field(struct renderer *renderer, const struct render_request 
         }
         frame->field_lower = pack(lower, cell);
         frame->field_dims.w = 1;
-        if (cells * (FIELD_CELL_BYTES + FIELD_WORKING_BYTES) + FIELD_FIXED_BYTES <=
-                renderer->shares.field ||
+        if (cells * field_cell_bytes(settings) + FIELD_FIXED_BYTES <= renderer->shares.field ||
             resolution <= 4)
             break;
     }

@@ -53,6 +53,7 @@ static void finish(struct lpv_work *work)
     }
     texture_finish(memory, &work->links);
     texture_finish(memory, &work->walls);
+    lpv_fuzzy_finish(work);
     buffer_finish(memory, &work->powers);
     buffer_finish(memory, &work->passes.block);
 }
@@ -146,6 +147,7 @@ static bool converged(struct convergence *so_far, double power)
 static brume_result propagate(struct lpv_work *work)
 {
     const struct transport_input *input = work->input;
+    const char *stem = lpv_is_fuzzy(work) ? "lpv_propagate_fuzzy" : "lpv_propagate";
     const int wanted = input->settings->iterations;
     const int most = wanted > 0 ? wanted : MOST_ITERATIONS;
     struct convergence so_far = {0};
@@ -157,12 +159,13 @@ static brume_result propagate(struct lpv_work *work)
     glBindTextureUnit(SLOT_CELL_ALBEDO, work->cells[1].id);
     glBindTextureUnit(SLOT_WALLS, work->cells[2].id);
     glBindTextureUnit(SLOT_LINKS, work->links.id);
+    glBindTextureUnit(SLOT_BLOCKED, work->fuzzy.factors.id);
     bind_images(SLOT_OUTPUT_FIELD, work->sums, GL_READ_WRITE, GL_RGBA32F);
     for (int i = 0; i < most; ++i) {
         const bool look = wanted <= 0 && i % ITERATIONS_A_LOOK == ITERATIONS_A_LOOK - 1;
         bind_textures(SLOT_FLOW, work->flow[i % 2]);
         bind_images(SLOT_OUTPUT, work->flow[(i + 1) % 2], GL_WRITE_ONLY, GL_RGBA32F);
-        TRY(over_lattice(work, "lpv_propagate", (ivec4){look, 1, 0, 0}));
+        TRY(over_lattice(work, stem, (ivec4){look, 1, 0, 0}));
         glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
         ++input->stats->iterations;
         double power = 0.0;
@@ -196,7 +199,11 @@ static brume_result find(struct lpv_work *work, struct transport *transport)
     TRY(make(work));
     TRY(lpv_cut_links(work));
     TRY(fill_cells(work));
+    if (lpv_is_fuzzy(work))
+        TRY(lpv_fuzzy_begin(work));
     TRY(lpv_reflect(work));
+    if (lpv_is_fuzzy(work))
+        TRY(lpv_fuzzy_prepare(work));
     TRY(begin(work, transport));
     TRY(propagate(work));
     return hand_over(work, transport);

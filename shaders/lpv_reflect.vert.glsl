@@ -12,6 +12,7 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
     gpu_reflection stage;
 };
 
+layout(binding = SLOT_LINKS) uniform usampler3D links;
 layout(binding = SLOT_RSM) uniform sampler2D rsm[3]; // position, normal, reflectance
 
 flat out vec3 power;
@@ -43,6 +44,23 @@ vec3 texel_power(vec3 p, out vec3 towards)
            light_transmittance(light, p, towards, distance);
 }
 
+ivec3 cell_at(vec3 p)
+{
+    return ivec3(floor((p - frame.field_lower.xyz) / frame.field_lower.w));
+}
+
+// Whether a surface cuts the link between two neighbours; far ones are taken to be parted.
+bool is_parted(ivec3 a, ivec3 b)
+{
+    ivec3 link = b - a;
+    for (int i = 0; i < 13; ++i) {
+        ivec3 from = link == LINKS[i] ? a : b;
+        if (link == LINKS[i] || link == -LINKS[i])
+            return in_links(from) && (texelFetch(links, links_texel(from), 0).r >> i & 1u) != 0u;
+    }
+    return link != ivec3(0);
+}
+
 void main()
 {
     power = axis = vec3(0.0);
@@ -58,12 +76,12 @@ void main()
     if (dot(axis, towards) < 0.0)
         axis = -axis; // both sides of a surface are the same
     float reach = 0.5 * frame.field_lower.w * (abs(axis.x) + abs(axis.y) + abs(axis.z));
-    ivec3 cell = ivec3(floor((p + axis * reach - frame.field_lower.xyz) / frame.field_lower.w));
+    ivec3 cell = cell_at(p + axis * reach);
+    // In a wedge's tip the other wall may be nearer than that. Towards the light nothing is.
+    ivec3 towards_light = cell_at(p + towards * (reach / max(dot(axis, towards), 0.5)));
+    if (is_parted(cell, towards_light))
+        cell = towards_light;
     if (!in_field(cell))
         return;
-    ivec3 dims = frame.field_dims.xyz;
-    int row = stage.tiles.x;
-    vec2 place = vec2(ivec2(cell.z % row, cell.z / row) * dims.xy + cell.xy) + 0.5;
-    gl_Position = vec4(place / vec2(dims.xy * ivec2(row, (dims.z + row - 1) / row)) * 2.0 - 1.0, 0.5,
-                       1.0);
+    gl_Position = tiled_position(cell, frame.field_dims.xyz, stage.tiles.x);
 }

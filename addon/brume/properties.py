@@ -15,12 +15,15 @@ METHODS = [
 ]
 
 PRESETS = {
-    'DRAFT': {"samples": 4, "medium_resolution": 64, "lattice_resolution": 32, "step": 4.0, "field_resolution": 16,
-              "shadow_resolution": 256, "light_samples": 4, "world_samples": 32},
-    'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64, "step": 3.0, "field_resolution": 32,
-                "shadow_resolution": 512, "light_samples": 8, "world_samples": 128},
-    'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96, "step": 1.0, "field_resolution": 64,
-              "shadow_resolution": 1024, "light_samples": 16, "world_samples": 256},
+    'DRAFT': {"samples": 4, "medium_resolution": 64, "lattice_resolution": 32,
+              "field_resolution": 16, "step": 4.0, "shadow_resolution": 256, "light_samples": 4,
+              "world_samples": 32},
+    'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64,
+                "field_resolution": 32, "step": 3.0, "shadow_resolution": 512, "light_samples": 8,
+                "world_samples": 128},
+    'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96,
+              "field_resolution": 64, "step": 1.0, "shadow_resolution": 1024,
+              "light_samples": 16, "world_samples": 256},
 }
 _DEFAULT = PRESETS['PREVIEW']
 
@@ -82,8 +85,8 @@ class BrumeSettings(bpy.types.PropertyGroup):
     field_resolution: IntProperty(
         name="Scattering Resolution", update=changed,
         default=_DEFAULT["field_resolution"], min=2, max=256, soft_max=128,
-        description="Cells along the longest side of the lattice in which light that was scattered "
-                    "or reflected goes on. It is soft: fewer do than for the lights' own. More tell "
+        description="Cells along the longest side of the lattice in which scattered and reflected "
+                    "light goes on. It is soft: fewer do than for the lights' own. More tell "
                     "smaller rooms and thicker smoke apart; memory grows with the third power, "
                     "time with the fourth where iterations go on until they converged")
     depths: EnumProperty(
@@ -99,11 +102,20 @@ class BrumeSettings(bpy.types.PropertyGroup):
                ('PAPER', "As Published", "For comparison: as in the paper on opacity propagation "
                                          "volumes. Too dark by half where light runs askew to the "
                                          "cells", 3)])
+    blockers: EnumProperty(
+        name="Blockers", update=changed, default='LINKS',
+        description="How surfaces stand in the way of light that goes from cell to cell",
+        items=[('LINKS', "Exact", "Ways from cell to cell that a surface cuts: none passes a wall, "
+                                  "however thin", 0),
+               ('FUZZY', "Fuzzy", "For comparison: as in the paper on light propagation volumes. "
+                                  "From what lights and six views from outside see. Some light "
+                                  "passes any wall, and it takes longer", 1)])
     iterations: IntProperty(
         name="Iterations", update=changed,
         default=0, min=0, max=1024,
-        description="How many cells far scattered and reflected light goes. 0 goes on until what is "
-                    "still to come no longer counts, which takes longest in closed bright rooms")
+        description="How many cells far scattered and reflected light goes. 0 goes on until what "
+                    "is still to come no longer counts, which takes longest in closed bright "
+                    "rooms")
     shadow_resolution: IntProperty(
         name="Shadow Resolution", update=changed,
         default=_DEFAULT["shadow_resolution"], min=16, max=8192,
@@ -206,6 +218,7 @@ def native_settings(settings):
         shadow_resolution=settings.shadow_resolution, light_samples=settings.light_samples,
         world_samples=settings.world_samples, step=settings.step,
         depths=native.DEPTHS[settings.depths],
+        blockers=native.BLOCKERS[settings.blockers],
         memory_budget=settings.memory_budget << 20)
 
 

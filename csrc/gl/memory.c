@@ -70,6 +70,7 @@ static uint64_t texel_bytes(GLenum format)
 {
     switch (format) {
     case GL_RGBA32F:
+    case GL_RGBA32UI:
         return 16;
     case GL_RGBA16F:
         return 8;
@@ -97,7 +98,8 @@ brume_result texture_init(struct memory *memory, struct texture *texture, enum p
                           GLenum target, GLenum format, int width, int height, int depth,
                           int levels, const char *label)
 {
-    const int integers = format == GL_R32UI; /* which are fetched, never filtered */
+    /* Which are fetched, never filtered. */
+    const int integers = format == GL_R32UI || format == GL_RGBA32UI;
     memset(texture, 0, sizeof *texture);
     while (glGetError() != GL_NO_ERROR)
         ;
@@ -113,7 +115,7 @@ brume_result texture_init(struct memory *memory, struct texture *texture, enum p
                     height, depth, label);
     }
     if (target == GL_TEXTURE_3D) /* what no cell fills is read with weight 0, but NaN stays NaN */
-        glClearTexImage(texture->id, 0, integers ? GL_RED_INTEGER : GL_RGBA,
+        glClearTexImage(texture->id, 0, integers ? GL_RGBA_INTEGER : GL_RGBA,
                         integers ? GL_UNSIGNED_INT : GL_FLOAT, NULL);
     glObjectLabel(GL_TEXTURE, texture->id, -1, label);
     const GLint filter = integers ? GL_NEAREST : GL_LINEAR;

@@ -171,11 +171,17 @@ int lattice_wants_field(const brume_settings *settings)
            settings->light_paths != BRUME_PATHS_SINGLE;
 }
 
+static uint64_t field_cell_bytes(const brume_settings *settings)
+{
+    return FIELD_CELL_BYTES + FIELD_WORKING_BYTES +
+           (settings->blockers == BRUME_BLOCKERS_FUZZY ? FIELD_FUZZY_BYTES : 0);
+}
+
 uint64_t lattice_field_bytes(const brume_settings *settings)
 {
     const uint64_t cells = (uint64_t)settings->field_resolution;
     return lattice_wants_field(settings)
-               ? cells * cells * cells * (FIELD_CELL_BYTES + FIELD_WORKING_BYTES) + FIELD_FIXED_BYTES
+               ? cells * cells * cells * field_cell_bytes(settings) + FIELD_FIXED_BYTES
                : 0;
 }
 
@@ -241,8 +247,7 @@ static void layout_field(struct renderer *renderer, const struct render_request 
         }
         frame->field_lower = pack(lower, cell);
         frame->field_dims.w = 1;
-        if (cells * (FIELD_CELL_BYTES + FIELD_WORKING_BYTES) + FIELD_FIXED_BYTES <=
-                renderer->shares.field ||
+        if (cells * field_cell_bytes(settings) + FIELD_FIXED_BYTES <= renderer->shares.field ||
             resolution <= 4)
             break;
     }

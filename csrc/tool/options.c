@@ -68,6 +68,8 @@ static const char help[] =
     "      --step X                march step in cells of the medium (default: 1)\n"
     "      --depths WAY            optical depths to the lamps: propagated (the default), marched\n"
     "                              (exact, slower); corrected or paper, to compare\n"
+    "      --blockers KIND         what keeps LPV's light from passing surfaces: links (exact,\n"
+    "                              the default) or fuzzy (as published, leaks; to compare)\n"
     "      --memory-budget MIB     on the GPU (default: 2048)\n"
     "\n"
     "Output\n"
@@ -379,6 +381,19 @@ static bool parse_depths(const char *option, const char *text, options *out)
     return false;
 }
 
+static bool parse_blockers(const char *option, const char *text, options *out)
+{
+    static const char *const kinds[] = {[BRUME_BLOCKERS_LINKS] = "links",
+                                        [BRUME_BLOCKERS_FUZZY] = "fuzzy"};
+    for (uint32_t kind = 0; kind < BRUME_BLOCKERS_COUNT; ++kind)
+        if (strcmp(text, kinds[kind]) == 0) {
+            out->settings.blockers = kind;
+            return true;
+        }
+    usage_error("--%s wants links or fuzzy, not '%s'", option, text);
+    return false;
+}
+
 /* What an option's value is, and so how it is read. */
 enum kind {
     KIND_FLAG,     /* bool, no value */
@@ -451,6 +466,7 @@ static const struct spec specs[] = {
     {"world-samples", KIND_COUNT, AT(settings.world_samples), .upper = 4096},
     {"step", KIND_NUMBER, AT(settings.step), .lower = 0.01f, .upper = 100.0f},
     {"depths", KIND_OWN, .parse = parse_depths},
+    {"blockers", KIND_OWN, .parse = parse_blockers},
     {"memory-budget", KIND_OWN, .parse = parse_memory_budget},
 };
 

@@ -70,6 +70,7 @@ static void finish(struct lpv_work *work)
     }
     texture_finish(memory, &work->links);
     texture_finish(memory, &work->walls);
+    lpv_fuzzy_finish(work);
     buffer_finish(memory, &work->powers);
     buffer_finish(memory, &work->passes.block);
 }
@@ -167,7 +168,8 @@ static brume_result iterate(struct lpv_work *work, int number, bool look, double
     } times = {(float)counts};
     bind_textures(SLOT_FLOW, work->flow[number % 2]);
     bind_images(SLOT_OUTPUT, work->flow[(number + 1) % 2], GL_WRITE_ONLY, GL_RGBA32F);
-    TRY(over_lattice(work, "lpv_propagate", (ivec4){look, times.bits, 0, 0}));
+    TRY(over_lattice(work, lpv_is_fuzzy(work) ? "lpv_propagate_fuzzy" : "lpv_propagate",
+                     (ivec4){look, times.bits, 0, 0}));
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     ++work->input->stats->iterations;
     return look ? in_flight(work, &work->input->stats->power_in_flight) : BRUME_OK;
@@ -183,6 +185,7 @@ static brume_result propagate(struct lpv_work *work)
     glBindTextureUnit(SLOT_CELL_ALBEDO, work->cells[1].id);
     glBindTextureUnit(SLOT_WALLS, work->cells[2].id);
     glBindTextureUnit(SLOT_LINKS, work->links.id);
+    glBindTextureUnit(SLOT_BLOCKED, work->fuzzy.factors.id);
     bind_images(SLOT_OUTPUT_FIELD, work->sums, GL_READ_WRITE, GL_RGBA32F);
     for (int i = 0; i < most; ++i) {
         const bool look = i % ITERATIONS_A_LOOK == ITERATIONS_A_LOOK - 1 || i == most - 1;
@@ -218,7 +221,11 @@ static brume_result find(struct lpv_work *work, struct transport *transport)
     TRY(make(work));
     TRY(lpv_cut_links(work));
     TRY(fill_cells(work));
+    if (lpv_is_fuzzy(work))
+        TRY(lpv_fuzzy_begin(work));
     TRY(lpv_reflect(work));
+    if (lpv_is_fuzzy(work))
+        TRY(lpv_fuzzy_prepare(work));
     TRY(begin(work));
     TRY(propagate(work));
     return hand_over(work, transport);

@@ -8,8 +8,20 @@
 /* Bytes of a cell: of the field, and of what is needed while it is found. */
 #define FIELD_CELL_BYTES 64
 #define FIELD_WORKING_BYTES 240 /* and one layer more of what is cut */
+#define FIELD_FUZZY_BYTES 96 /* the same, for fuzzy blockers, and one layer more of their lattice */
 /* Beside the lattice: reflective shadow maps, and blocks. */
 #define FIELD_FIXED_BYTES (3u << 20)
+
+/* Fuzzy blockers. Their lattice stands half a cell lower than the field's and has a cell more along
+ * every side, so that each of its cells lies between eight of the field's. Areas come in pairs: of
+ * surfaces whose normals point along the axes, and of those that point against them. */
+struct lpv_fuzzy {
+    ivec4 dims;                     /* w: tiles in a row of the sums */
+    struct texture sums[2];         /* of the maps of one set, layers as tiles */
+    struct texture areas[2];        /* the greatest sums of all sets */
+    struct texture factors;         /* of what is sent along a cell's 26 links, the share blocked */
+    GLuint target;                  /* framebuffer of the sums */
+};
 
 /* One run. Textures of the lattice's size, colours apart. */
 struct lpv_work {
@@ -22,12 +34,29 @@ struct lpv_work {
     struct texture reflected[3];    /* what surfaces reflect first, the lattice's layers as tiles */
     int tiles;                      /* of these in a row */
     struct buffer powers;           /* in flight, a group of the last iteration */
+    struct lpv_fuzzy fuzzy;         /* nothing, where links block */
     bool media;                     /* false: the lattice knows surfaces alone */
 };
 
 /* Links that surfaces cut, and what these reflect, into work->links and walls. */
 brume_result lpv_cut_links(struct lpv_work *work);
-/* What surfaces reflect of the lights' own light, into work->reflected. */
+/* What surfaces reflect of the lights' own light, into work->reflected; and where blockers are
+ * fuzzy, the areas of the surfaces that lights see, or that are seen from outside. */
 brume_result lpv_reflect(struct lpv_work *work);
+
+/* Fuzzy blockers: whether they are wanted. */
+bool lpv_is_fuzzy(const struct lpv_work *work);
+brume_result lpv_fuzzy_begin(struct lpv_work *work);
+/* Adds the map that is bound, with its gpu_reflection at SLOT_STAGE; so many texels. */
+brume_result lpv_fuzzy_add(struct lpv_work *work, int texels);
+/* Ends a set of maps that see no surface twice. */
+brume_result lpv_fuzzy_keep(struct lpv_work *work);
+/* The view from outside along an axis (0, 1, 2), from its end or from its beginning. Returns the
+ * side of its map, `most` texels at most. */
+int lpv_fuzzy_view(const struct lpv_work *work, int axis, bool from_end, int most,
+                   struct gpu_shadow_view *out);
+/* All links' factors, from the areas. */
+brume_result lpv_fuzzy_prepare(struct lpv_work *work);
+void lpv_fuzzy_finish(struct lpv_work *work);
 
 #endif

@@ -41,6 +41,7 @@ static brume_result make_maps(struct lpv_work *work, struct maps *maps)
         glNamedFramebufferTexture(maps->target, targets[i], work->reflected[i].id, 0);
         glBindTextureUnit((GLuint)(SLOT_RSM + i), colors[i]->id);
     }
+    glBindTextureUnit(SLOT_LINKS, work->links.id);
     glNamedFramebufferTexture(maps->framebuffer, GL_DEPTH_ATTACHMENT, maps->depth.id, 0);
     glNamedFramebufferDrawBuffers(maps->framebuffer, 3, targets);
     glNamedFramebufferDrawBuffers(maps->target, 3, targets);
@@ -60,14 +61,13 @@ static void finish_maps(struct memory *memory, struct maps *maps)
     buffer_finish(memory, &maps->block);
 }
 
-/* Draws what the light sees, and strews it. */
-static brume_result one_map(struct lpv_work *work, struct maps *maps,
-                            const struct gpu_shadow_view *view, ivec4 what, float scale)
+/* Draws what is seen, and tells the shaders that strew it. */
+static brume_result draw_map(struct lpv_work *work, struct maps *maps,
+                             const struct gpu_shadow_view *view, ivec4 what, float scale)
 {
     static const float nothing[4], far_;
     const struct transport_input *input = work->input;
     const int side = what.w;
-    const struct program *program;
     TRY(opv_go_on(&work->passes, 0.0f));
     glBindFramebuffer(GL_FRAMEBUFFER, maps->framebuffer);
     glViewport(0, 0, side, side);
@@ -79,20 +79,51 @@ static brume_result one_map(struct lpv_work *work, struct maps *maps,
     const struct gpu_reflection reflection = {.clip_from_world = view->clip_from_world,
                                               .scale = {view->range.w, scale, 0, 0},
                                               .what = what,
-                                              .tiles = {work->tiles, 0, 0, 0}};
+                                              .tiles = {work->tiles, work->fuzzy.dims.w, 0, 0}};
     TRY(buffer_update(&input->gpu->memory, &maps->block, FOR_TRANSPORT, sizeof reflection,
                       &reflection, "reflection"));
-    TRY(program_draw(&input->gpu->programs, "lpv_reflect", &program));
     glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_STAGE, maps->block.id);
-    glBindFramebuffer(GL_FRAMEBUFFER, maps->target);
-    const ivec4 dims = input->frame->field_dims;
-    glViewport(0, 0, work->tiles * dims.x, (dims.z + work->tiles - 1) / work->tiles * dims.y);
     glBindVertexArray(maps->vertex_array);
+    return BRUME_OK;
+}
+
+/* Draws what the light sees, and strews it. */
+static brume_result one_map(struct lpv_work *work, struct maps *maps,
+                            const struct gpu_shadow_view *view, ivec4 what, float scale)
+{
+    const int texels = what.w * what.w;
+    const struct program *program;
+    TRY(draw_map(work, maps, view, what, scale));
+    TRY(program_draw(&work->input->gpu->programs, "lpv_reflect", &program));
+    glBindFramebuffer(GL_FRAMEBUFFER, maps->target);
+    const ivec4 dims = work->input->frame->field_dims;
+    glViewport(0, 0, work->tiles * dims.x, (dims.z + work->tiles - 1) / work->tiles * dims.y);
     glUseProgram(program->id);
     glEnable(GL_BLEND);
     glBlendFunc(GL_ONE, GL_ONE);
-    glDrawArrays(GL_POINTS, 0, side * side);
+    glDrawArrays(GL_POINTS, 0, texels);
     glDisable(GL_BLEND);
+    return lpv_is_fuzzy(work) ? lpv_fuzzy_add(work, texels) : BRUME_OK;
+}
+
+/* Of one sample of a light all has been drawn. */
+static brume_result end_sample(struct lpv_work *work)
+{
+    return lpv_is_fuzzy(work) ? lpv_fuzzy_keep(work) : BRUME_OK;
+}
+
+/* The surfaces as seen from outside, for fuzzy blockers alone. What the camera sees, which could be
+ * added, is left out: the field would depend on the view, flicker as the camera moves, and have to
+ * be propagated anew for each move. */
+static brume_result see_from_outside(struct lpv_work *work, struct maps *maps)
+{
+    for (int i = 0; i < 6; ++i) {
+        struct gpu_shadow_view view;
+        const int side = lpv_fuzzy_view(work, i % 3, i >= 3, SUN_SIDE, &view);
+        TRY(draw_map(work, maps, &view, (ivec4){-1, 0, 0, side}, 0.0f));
+        TRY(lpv_fuzzy_add(work, side * side));
+        TRY(lpv_fuzzy_keep(work));
+    }
     return BRUME_OK;
 }
 
@@ -115,7 +146,8 @@ static brume_result distant(struct lpv_work *work, struct maps *maps, const vec4
     field_box(input->frame, lower, upper);
     light_view_distant(input->geometry->lower, input->geometry->upper, lower, upper,
                        towards, what.w, &view);
-    return one_map(work, maps, &view, what, scale);
+    TRY(one_map(work, maps, &view, what, scale));
+    return end_sample(work);
 }
 
 static brume_result lamp(struct lpv_work *work, struct maps *maps, int number, int sample,
@@ -134,7 +166,7 @@ static brume_result lamp(struct lpv_work *work, struct maps *maps, int number, i
         light_view_face(light, eye, face, tangent, FACE_SIDE, near_, &view);
         TRY(one_map(work, maps, &view, (ivec4){number, sample, (int)face, FACE_SIDE}, scale));
     }
-    return BRUME_OK;
+    return end_sample(work);
 }
 
 /* Of several samples of a light some are taken, evenly. */
@@ -182,6 +214,8 @@ brume_result lpv_reflect(struct lpv_work *work)
     brume_result result = make_maps(work, &maps);
     if (result == BRUME_OK)
         result = all_maps(work, &maps);
+    if (result == BRUME_OK && lpv_is_fuzzy(work))
+        result = see_from_outside(work, &maps);
     finish_maps(&work->input->gpu->memory, &maps);
     return result;
 }

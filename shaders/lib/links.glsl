@@ -29,6 +29,13 @@ vec3 cell_centre(ivec3 cell)
     return frame.field_lower.xyz + (vec3(cell) + 0.5) * frame.field_lower.w;
 }
 
+// Where a cell stands in a picture of a lattice with its layers as tiles, so many in a row.
+vec4 tiled_position(ivec3 cell, ivec3 dims, int row)
+{
+    vec2 place = vec2(ivec2(cell.z % row, cell.z / row) * dims.xy + cell.xy) + 0.5;
+    return vec4(place / vec2(dims.xy * ivec2(row, (dims.z + row - 1) / row)) * 2.0 - 1.0, 0.5, 1.0);
+}
+
 bool in_field(ivec3 cell)
 {
     return all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, frame.field_dims.xyz));

@@ -65,8 +65,10 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_CELL_ALBEDO 22
 #define SLOT_WALLS 23
 #define SLOT_FLOW 24         /* and two more: red, green, blue */
+#define SLOT_AREAS 24        /* and one more: fuzzy blockers' */
 #define SLOT_REFLECTED 27    /* and two more */
 #define SLOT_RSM 27          /* and two more: position, normal, reflectance */
+#define SLOT_BLOCKED 30
 
 /* Images written by compute passes, and by the drawing of links */
 #define SLOT_OUTPUT 0
@@ -166,8 +168,10 @@ struct gpu_reflection {
     mat4 clip_from_world;
     vec4 scale;          /* x: texel's side, m at distance 1 (perspective) or anywhere; y: times the
                             light of its sample */
-    ivec4 what;          /* light, -1: the world; sample; face; texels of a side */
-    ivec4 tiles;         /* x: layers of the lattice in a row of the picture that it is gathered in */
+    ivec4 what;          /* light, -1: from afar without one; sample, also the world's; face; texels
+                            of a side */
+    ivec4 tiles;         /* x: layers of the lattice in a row of the picture that it is gathered in;
+                            y: the same of the fuzzy blockers' */
 };
 
 /* A point of a lamp, or a direction towards one, that optical depths are found to. */

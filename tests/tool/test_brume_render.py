@@ -49,6 +49,7 @@ def test_version(run):
     (["--anisotropy", "1"], "--anisotropy must be from -0.99 to 0.99"),
     (["--albedo", "1,2"], "--albedo wants three numbers"),
     (["--depths", "exact"], "--depths wants propagated, marched, corrected or paper"),
+    (["--blockers", "walls"], "--blockers wants links or fuzzy, not 'walls'"),
     (["--albedo", "0.5,0.5,1.5"], "--albedo must be from 0 to 1"),
     (["--eye", "1,2,nan"], "--eye wants three numbers"),
     (["--sun", "0,0,0"], "a direction that is not zero"),

@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What surfaces block of the light on a link: shares of it.
+#include "lib/links.glsl"
+
+struct link_blockers
+{
+    float there; // of what the cell sends
+    float back;  // of what comes to it; 1 where nothing can
+};

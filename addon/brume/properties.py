@@ -92,6 +92,22 @@ class BrumeSettings(bpy.types.PropertyGroup):
                ('PAPER', "As Published", "For comparison: as in the paper on opacity propagation "
                                          "volumes. Too dark by half where light runs askew to the "
                                          "cells", 3)])
+    light_paths: EnumProperty(
+        name="Light Paths", update=changed, default='ALL',
+        description="Which of the light is shown. All but the first are for comparison, and Light "
+                    "Propagation's alone",
+        items=[('ALL', "Everything", "What volumes scatter and surfaces reflect, as often as it "
+                                     "takes", 0),
+               ('DIRECT', "Direct", "Surfaces in the light of lamps and world, as far as volumes "
+                                    "let it through", 1),
+               ('REFLECTED', "Reflected", "Direct light, and what surfaces reflect to one another",
+                2),
+               ('SINGLE', "Single Scattering", "Direct light, and what volumes scatter once of the "
+                                               "light of lamps and world", 3),
+               ('REFLECTED_MARCHED', "Reflected and Marched",
+                "Reflected light, and what volumes scatter of it to the camera", 4),
+               ('SUM', "Sum", "Single scattering together with reflected and marched light: what "
+                              "volumes scatter lights neither surfaces nor volumes", 5)])
     iterations: IntProperty(
         name="Iterations", update=changed,
         default=0, min=0, max=1024,
@@ -198,6 +214,7 @@ def native_settings(settings):
         shadow_resolution=settings.shadow_resolution, light_samples=settings.light_samples,
         world_samples=settings.world_samples, step=settings.step,
         depths=native.DEPTHS[settings.depths],
+        light_paths=native.LIGHT_PATHS[settings.light_paths],
         memory_budget=settings.memory_budget << 20)
 
 

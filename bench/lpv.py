@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far LPV's pictures, and the parts of their light, are from Cycles with all bounces: the
 configurations of Figure 5 of the paper on light propagation volumes with scattering. Appends a JSON
-line to out/bench/lpv.jsonl, and leaves there Brume | Cycles | their difference of each:
+line to out/bench/lpv.jsonl, and leaves the pictures in out/bench/lpv, as .npy and as PNGs, Brume |
+Cycles | their difference:
 
     python3 bench/lpv.py [--scenes room arcade ...]
 
@@ -109,10 +110,13 @@ def measure(case):
     print(f'{case.scene}: Cycles\' noise {noise:.4f}', file=sys.stderr)
     kinds = [*((paths, CELLS) for paths in PATHS), ('ALL', FINER)]
     errors = {}
+    np.save(os.path.join(OUT, 'lpv', f'{case.scene}-CYCLES.npy'), picture.astype(np.float32))
     for (paths, cells), found in zip(kinds, brume(case, kinds)):
         name = paths if cells == CELLS else f'{paths}_{cells}'
         errors[name] = compare.difference(found, picture)[0]
-        compare.side_by_side(os.path.join(OUT, 'lpv', f'{case.scene}-{name}.png'), found, picture)
+        path = os.path.join(OUT, 'lpv', f'{case.scene}-{name}')
+        np.save(path + '.npy', found)
+        compare.side_by_side(path + '.png', found, picture)
         print(f'{case.scene}: {name} {errors[name]:.4f}', file=sys.stderr)
     return {'errors': errors, 'noise': noise}
 

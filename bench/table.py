@@ -190,11 +190,15 @@ PATHS = {'DIRECT': 'direct: surfaces, straight from the lights',
 
 
 def lpv_page(lines):
+    """The newest measurement of each scene."""
     line = lines[-1]
     width, height = line['resolution']
-    scenes = line['scenes']
-    yield (f'{line["device"]}; commit {version(line)}. Pictures of {width}x{height} pixels, preset '
-           f'Preview, iterations until converged.')
+    scenes, versions = {}, {}
+    for some in lines:
+        for name, found in some['scenes'].items():
+            scenes[name], versions[name] = found, version(some)
+    yield (f'{line["device"]}; commit {", ".join(dict.fromkeys(versions.values()))}. Pictures of '
+           f'{width}x{height} pixels, preset Preview, iterations until converged.')
     yield ''
     yield row('light', 'cells', *(f'`{name}.blend`' for name in scenes))
     yield row('---', '---:', *['---:'] * len(scenes))

@@ -47,7 +47,6 @@ class Case:
     scene: str
     samples: int        # Cycles', a seed
     zoom: float = 1.0   # multiplies the lens, so that the subject fills the square
-    most: int = 16      # pairs of seeds
 
 
 CASES = {case.scene: case for case in (
@@ -77,9 +76,9 @@ def digest(case):
     return found.hexdigest()[:16]
 
 
-def reference(case):
-    """(Cycles' picture, its noise): the mean of two halves of as many seeds as it takes. Two halves
-    differ by twice the error of their mean."""
+def reference(case, most):
+    """(Cycles' picture, its noise): the mean of two halves of as many seeds as it takes, or of the
+    most that are wanted. Two halves differ by twice the error of their mean."""
     path = os.path.join(REFERENCES, f'{case.scene}-{digest(case)}.npz')
     pairs, halves = 0, [0.0, 0.0]
     if os.path.exists(path):
@@ -88,7 +87,7 @@ def reference(case):
     while True:
         if pairs:
             noise = compare.difference(*(half / pairs for half in halves))[0] / 2
-            if noise < NOISE or pairs >= case.most:
+            if noise < NOISE or pairs >= most:
                 return (halves[0] + halves[1]) / (2 * pairs), noise
         both = run(case, [{'engine': 'CYCLES', 'settings': {
             **CYCLES, 'seed': 2 * pairs + i, 'samples': case.samples}} for i in (0, 1)])
@@ -105,8 +104,8 @@ def brume(case, kinds):
         for paths, cells in kinds])
 
 
-def measure(case):
-    picture, noise = reference(case)
+def measure(case, most):
+    picture, noise = reference(case, most)
     print(f'{case.scene}: Cycles\' noise {noise:.4f}', file=sys.stderr)
     kinds = [*((paths, CELLS) for paths in PATHS), ('ALL', FINER)]
     errors = {}
@@ -124,16 +123,17 @@ def measure(case):
 def main():
     parser = argparse.ArgumentParser(prog='lpv.py')
     parser.add_argument('--scenes', nargs='+', choices=CASES, default=list(CASES))
+    parser.add_argument('--pairs', type=int, default=16, help='of seeds, at most, for Cycles')
     parser.add_argument('--references', action='store_true', help='render what Cycles has to alone')
     options = parser.parse_args()
     os.makedirs(os.path.join(OUT, 'lpv'), exist_ok=True)
     if options.references:
         for name in options.scenes:
-            print(f'{name}: Cycles\' noise {reference(CASES[name])[1]:.4f}')
+            print(f'{name}: Cycles\' noise {reference(CASES[name], options.pairs)[1]:.4f}')
         return
     line = {'bench': 'lpv', **here(), 'device': native.Device().describe().renderer.decode(),
             'resolution': [SIZE, SIZE], 'cells': CELLS, 'finer': FINER,
-            'scenes': {name: measure(CASES[name]) for name in options.scenes}}
+            'scenes': {name: measure(CASES[name], options.pairs) for name in options.scenes}}
     with open(os.path.join(OUT, 'lpv.jsonl'), 'a', encoding='utf-8') as file:
         file.write(json.dumps(line) + '\n')
     print(json.dumps(line, indent=1))

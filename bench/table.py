@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the Markdown tables of the docs from the JSON lines of bench/peers.py, viewport.py,
-export.py or opv.py.
+export.py, opv.py or lpv.py.
 
     python3 bench/table.py FILE.jsonl [--into docs/PAGE.md]
 
@@ -182,8 +182,38 @@ def opv_page(lines):
     yield ''
 
 
+PATHS = {'DIRECT': 'direct: surfaces, straight from the lights',
+         'REFLECTED': 'direct, and what surfaces reflect to one another',
+         'SINGLE': 'direct, and what media scatter once',
+         'REFLECTED_MARCHED': 'reflected, and what media scatter of it to the camera',
+         'SUM': 'the last two added up', 'ALL': 'everything'}
+
+
+def lpv_page(lines):
+    """The newest measurement of each scene."""
+    line = lines[-1]
+    width, height = line['resolution']
+    scenes, versions = {}, {}
+    for some in lines:
+        for name, found in some['scenes'].items():
+            scenes[name], versions[name] = found, version(some)
+    yield (f'{line["device"]}; commit {", ".join(dict.fromkeys(versions.values()))}. Pictures of '
+           f'{width}x{height} pixels, preset Preview, iterations until converged.')
+    yield ''
+    yield row('light', 'cells', *(f'`{name}.blend`' for name in scenes))
+    yield row('---', '---:', *['---:'] * len(scenes))
+    for paths, name in PATHS.items():
+        for key, cells in ((paths, line['cells']), (f'{paths}_{line["finer"]}', line['finer'])):
+            if all(key in scene['errors'] for scene in scenes.values()):
+                yield row(name, cells,
+                          *(f'{100 * scene["errors"][key]:.1f} %' for scene in scenes.values()))
+    yield row('Cycles\' own noise', '', *(f'{100 * scene["noise"]:.1f} %'
+                                          for scene in scenes.values()))
+    yield ''
+
+
 PAGES = {'peers': page, 'viewport': viewport_page}
-WHOLE_PAGES = {'export': export_page, 'opv': opv_page}
+WHOLE_PAGES = {'export': export_page, 'opv': opv_page, 'lpv': lpv_page}
 
 
 def main():

@@ -38,12 +38,12 @@ def save(name):
                                 relative_remap=True)
 
 
-def finish(name, samples=64, bounces=4, engine='BRUME'):
+def finish(name, samples=64, bounces=4, engine='BRUME', volume_bounces=0):
     """Sets both engines up, looks through the camera in every 3D view, and saves the file with
     `engine` chosen if it is there, else Cycles.
 
-    Cycles gets single scattering (no volume bounces) without clamping or denoising: what Brume's
-    single scattering is compared with.
+    Cycles gets single scattering, unless volume_bounces says otherwise, without clamping or
+    denoising: what Brume's single scattering is compared with.
     """
     scene = bpy.context.scene
     scene.render.engine = 'CYCLES'
@@ -54,7 +54,7 @@ def finish(name, samples=64, bounces=4, engine='BRUME'):
     cycles.use_adaptive_sampling = False
     cycles.use_denoising = False
     cycles.max_bounces = bounces
-    cycles.volume_bounces = 0
+    cycles.volume_bounces = volume_bounces
     # A volume's hull is jagged: with the default of 8, rays that cross it often end in black.
     cycles.transparent_max_bounces = 256
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0

@@ -65,7 +65,6 @@ class BRUME_PT_sampling_advanced(_Rows, _RenderPanel, bpy.types.Panel):
 
 class BRUME_PT_volumes(_Rows, _RenderPanel, bpy.types.Panel):
     bl_label = "Volumes"
-    # Iterations come here with the first method that has any.
     rows = ("method", "medium_resolution", "lattice_resolution", "step")
 
 
@@ -77,7 +76,28 @@ class BRUME_PT_single_scattering(_Rows, _RenderPanel, bpy.types.Panel):
 
     @classmethod
     def applies(cls, context):
-        return context.scene.brume.method == 'OPV'
+        return context.scene.brume.method in {'OPV', 'LPV'}
+
+
+class BRUME_PT_light_propagation(_Rows, _RenderPanel, bpy.types.Panel):
+    bl_label = "Light Propagation"
+    bl_parent_id = "BRUME_PT_volumes"
+    rows = ("field_resolution", "iterations")
+
+    @classmethod
+    def applies(cls, context):
+        return context.scene.brume.method == 'LPV'
+
+
+class BRUME_PT_light_propagation_comparison(_Rows, _RenderPanel, bpy.types.Panel):
+    bl_label = "Comparison"
+    bl_parent_id = "BRUME_PT_light_propagation"
+    bl_options = {'DEFAULT_CLOSED'}
+    rows = ("light_paths", "blockers")
+
+    @classmethod
+    def applies(cls, context):
+        return context.scene.brume.method == 'LPV'
 
 
 class BRUME_PT_world_volume(_RenderPanel, bpy.types.Panel):
@@ -246,6 +266,7 @@ class BRUME_PT_light_nodes(_LightPanel, bpy.types.Panel):
 
 
 _CLASSES = (BRUME_PT_sampling, BRUME_PT_sampling_advanced, BRUME_PT_volumes,
+            BRUME_PT_light_propagation, BRUME_PT_light_propagation_comparison,
             BRUME_PT_single_scattering, BRUME_PT_world_volume, BRUME_PT_lights, BRUME_PT_film,
             BRUME_PT_performance,
             BRUME_PT_passes, BRUME_PT_override, BRUME_PT_ray_visibility,

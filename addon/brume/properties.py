@@ -110,6 +110,22 @@ class BrumeSettings(bpy.types.PropertyGroup):
                ('FUZZY', "Fuzzy", "For comparison: as in the paper on light propagation volumes. "
                                   "From what lights and six views from outside see. Some light "
                                   "passes any wall, and it takes longer", 1)])
+    light_paths: EnumProperty(
+        name="Light Paths", update=changed, default='ALL',
+        description="Which of the light is shown. All but the first are for comparison, and Light "
+                    "Propagation's alone",
+        items=[('ALL', "Everything", "What volumes scatter and surfaces reflect, as often as it "
+                                     "takes", 0),
+               ('DIRECT', "Direct", "Surfaces in the light of lamps and world, as far as volumes "
+                                    "let it through", 1),
+               ('REFLECTED', "Reflected", "Direct light, and what surfaces reflect to one another",
+                2),
+               ('SINGLE', "Single Scattering", "Direct light, and what volumes scatter once of the "
+                                               "light of lamps and world", 3),
+               ('REFLECTED_MARCHED', "Reflected and Marched",
+                "Reflected light, and what volumes scatter of it to the camera", 4),
+               ('SUM', "Sum", "Single scattering together with reflected and marched light: what "
+                              "volumes scatter lights neither surfaces nor volumes", 5)])
     iterations: IntProperty(
         name="Iterations", update=changed,
         default=0, min=0, max=1024,
@@ -219,6 +235,7 @@ def native_settings(settings):
         world_samples=settings.world_samples, step=settings.step,
         depths=native.DEPTHS[settings.depths],
         blockers=native.BLOCKERS[settings.blockers],
+        light_paths=native.LIGHT_PATHS[settings.light_paths],
         memory_budget=settings.memory_budget << 20)
 
 

@@ -68,13 +68,18 @@ static const char help[] =
     "      --step X                march step in cells of the medium (default: 1)\n"
     "      --depths WAY            optical depths to the lamps: propagated (the default), marched\n"
     "                              (exact, slower); corrected or paper, to compare\n"
+    "      --method METHOD         opv: light that media scatter once (the default); lpv: and what\n"
+    "                              they and surfaces go on to scatter\n"
+    "      --field-resolution N    lpv: cells along the longest side of the lattice in which that\n"
+    "                              goes on (default: half of --lattice-resolution)\n"
+    "      --iterations N          lpv: how many cells far (default: until it converged)\n"
     "      --blockers KIND         what keeps LPV's light from passing surfaces: links (exact,\n"
     "                              the default) or fuzzy (as published, leaks; to compare)\n"
     "      --memory-budget MIB     on the GPU (default: 2048)\n"
     "\n"
     "Output\n"
     "      --passes LIST           further layers of the picture: all, or of depth,normal,volumedir,\n"
-    "                              emit,env,transmittance\n"
+    "                              emit,env,transmittance,volumeind\n"
     "      --transparent           alpha tells coverage, the world is not drawn\n"
     "      --stats                 print stage times and memory\n"
     "  -v, --verbose               print what the library says\n"
@@ -381,6 +386,18 @@ static bool parse_depths(const char *option, const char *text, options *out)
     return false;
 }
 
+static bool parse_method(const char *option, const char *text, options *out)
+{
+    static const char *const methods[] = {[BRUME_METHOD_OPV] = "opv", [BRUME_METHOD_LPV] = "lpv"};
+    for (uint32_t method = 0; method < BRUME_METHOD_COUNT; ++method)
+        if (strcmp(text, methods[method]) == 0) {
+            out->settings.method = method;
+            return true;
+        }
+    usage_error("--%s wants opv or lpv, not '%s'", option, text);
+    return false;
+}
+
 static bool parse_blockers(const char *option, const char *text, options *out)
 {
     static const char *const kinds[] = {[BRUME_BLOCKERS_LINKS] = "links",
@@ -465,6 +482,9 @@ static const struct spec specs[] = {
     {"light-samples", KIND_COUNT, AT(settings.light_samples), .upper = 4096},
     {"world-samples", KIND_COUNT, AT(settings.world_samples), .upper = 4096},
     {"step", KIND_NUMBER, AT(settings.step), .lower = 0.01f, .upper = 100.0f},
+    {"method", KIND_OWN, .parse = parse_method},
+    {"field-resolution", KIND_COUNT, AT(settings.field_resolution), .upper = 256},
+    {"iterations", KIND_COUNT, AT(settings.iterations), .upper = 100000},
     {"depths", KIND_OWN, .parse = parse_depths},
     {"blockers", KIND_OWN, .parse = parse_blockers},
     {"memory-budget", KIND_OWN, .parse = parse_memory_budget},

@@ -3,14 +3,18 @@
 """Makes the user guide's pictures: scenes rendered by Brume, and its panels in Blender's window.
 
     docs/images/make.py [NAME]...    all, or some: room cloud fog_lights fog_sixteen panels viewport
+                                     lpv_paths
 
-Needs what scripts/setup installs, and a built library; a virtual display is its own.
+Needs what scripts/setup installs, and a built library; a virtual display is its own. lpv_paths sets
+side by side what `bench/lpv.py --scenes room` left in out/bench/lpv.
 """
 
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
@@ -119,13 +123,37 @@ def window(name, steps, width, height):
             display=f"{width}x{height}")
 
 
+def sheet(name):
+    """The room's light in parts, in the order of bench/lpv.py, and last Cycles: four in a row."""
+    sys.path[:0] = map(str, (ROOT / "bench", ROOT / "tests" / "pictures"))
+    import compare
+    from lpv import OUT, PATHS
+    files = [Path(OUT) / "lpv" / f"room-{kind}.npy" for kind in (*PATHS, "CYCLES")]
+    missing = [file for file in files if not file.exists()]
+    if missing:
+        sys.exit(f"make.py: {missing[0]} is not there: run bench/lpv.py --scenes room")
+    pictures = [np.load(file) for file in files]
+    exposure = 0.8 / np.percentile(pictures[-1], 97)
+    side, gap, across = pictures[0].shape[0], 8, 4
+    down = -(-len(pictures) // across)
+    page = np.ones((down * (side + gap) - gap, across * (side + gap) - gap, 3))
+    for number, picture in enumerate(pictures):
+        row, column = divmod(number, across)
+        y, x = (down - 1 - row) * (side + gap), column * (side + gap)  # the first row is the lowest
+        page[y:y + side, x:x + side] = compare.srgb(picture * exposure)
+    compare.write_png(HERE / f"{name}.png", page)
+
+
+SHEETS = ("lpv_paths",)
 WINDOWS = {"panels": (PANELS, 820, 560), "viewport": (VIEWPORT, 1100, 720)}
 
-for wanted in sys.argv[1:] or (*SCENES, *WINDOWS):
+for wanted in sys.argv[1:] or (*SCENES, *WINDOWS, *SHEETS):
     if wanted in WINDOWS:
         window(wanted, *WINDOWS[wanted])
     elif wanted in SCENES:
         scene(wanted)
+    elif wanted in SHEETS:
+        sheet(wanted)
     else:
         sys.exit(f"make.py: there is no picture {wanted}")
     # Blender stamps the file's path into a picture.

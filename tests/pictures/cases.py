@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pictures that are compared with Cycles: a scene, the lamps that are lit, and a tolerance.
 
-All are direct light and single scattering only. Cycles' samples are chosen so that its own noise
+All but those of LPV are direct light and single scattering only. Cycles' samples are chosen so that its own noise
 stays below a quarter of the tolerance; the tests assert that too.
 """
 import os
@@ -29,12 +29,14 @@ class Case:
     groups: tuple = ()
     world_samples: int = 0  # Brume's; 0: the default
     passes: tuple = ()      # beyond Combined: of "Depth", "Normal", "Emit", "Env"
+    method: str = 'OPV'     # Brume's; with another, Cycles goes on for 64 bounces
     twin: bool = False      # Cycles renders SCENE_twin.blend, which looks the same to it
 
     @property
     def name(self):
         lamp = self.lamps if len(self.lamps) == 1 else ()
-        return '-'.join((self.scene, *lamp, *([self.change] if self.change else [])))
+        method = [self.method] if self.method != 'OPV' else []
+        return '-'.join((self.scene, *lamp, *([self.change] if self.change else []), *method))
 
     def apply(self, scene):
         if self.change:
@@ -84,4 +86,7 @@ CASES = {case.name: case for case in (
     Case('environment', (), 0.04, 1024, change='hdr', groups=ROUND),
     Case('environment', (), 0.04, 1024, change='turned_as_point', groups=ROUND),
     Case('environment', (), 0.04, 1024, change='turned_as_texture', groups=ROUND),
+    Case('cube', (), 0.05, 512, zoom=1.4, method='LPV'),
+    Case('cloud', (), 0.07, 512, zoom=1.15, method='LPV'),
+    Case('room', (), 0.12, 2048, method='LPV'),
 )}

@@ -37,12 +37,12 @@ def difference(picture, reference, blocks=BLOCKS):
 def side_by_side(path, picture, reference, gain=4.0):
     """Writes picture | reference | signed difference (times gain, around grey) as an 8-bit PNG."""
     exposure = 0.8 / max(np.percentile(reference, 98), 1e-6)
-    shown = [_srgb(image * exposure) for image in (picture, reference)]
+    shown = [srgb(image * exposure) for image in (picture, reference)]
     shown.append(np.clip(0.5 + gain * exposure * (picture - reference), 0.0, 1.0))
     write_png(path, np.concatenate(shown, axis=1))
 
 
-def _srgb(linear):
+def srgb(linear):
     linear = np.clip(linear, 0.0, 1.0)
     return np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 

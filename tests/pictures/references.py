@@ -43,6 +43,8 @@ def digest(case):
                                  case.cycles_samples)).encode())
     if case.change:
         found.update(inspect.getsource(getattr(changes, case.change)).encode())
+    if case.method != 'OPV':
+        found.update(b'all bounces')
     if case.groups or case.passes:
         found.update(repr((bool(case.groups), case.passes)).encode())
     data = sorted(glob.glob(os.path.join(SCENES, case.scene + '.[eh][xd]r')))

@@ -27,7 +27,7 @@ PASSES = {'Combined': ('RGBA', 'use_pass_combined'), 'Depth': ('Z', 'use_pass_z'
 
 
 def set_up(scene, case):
-    """The case's lamps, size and light paths: no bounce beyond the first scattering."""
+    """The case's lamps and size."""
     for thing in scene.objects:
         if thing.type == 'LIGHT' and case.lamps:
             thing.hide_render = thing.name not in case.lamps
@@ -56,8 +56,10 @@ def set_up_cycles(scene, case, seed):
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     cycles.light_sampling_threshold = 0.0
-    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = 0
-    cycles.transmission_bounces = cycles.volume_bounces = 0
+    # No bounce beyond the first scattering, unless the method has them.
+    bounces = 0 if case.method == 'OPV' else 64
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = bounces
+    cycles.transmission_bounces = cycles.volume_bounces = bounces
     cycles.transparent_max_bounces = 256
     cycles.volume_step_rate, cycles.volume_max_steps = case.step_rate, 65536
     cycles.filter_width = scene.render.filter_size
@@ -97,6 +99,7 @@ def main(arguments):
             set_up_cycles(scene, case, options.seed)
         elif options.engine == 'BRUME':
             scene.brume.samples = case.samples
+            scene.brume.method = case.method
             if case.world_samples:
                 scene.brume.world_samples = case.world_samples
         passes = render(scene, options.engine, os.path.join(options.out, name + '.exr'))

@@ -67,12 +67,26 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_FLOW 24         /* and two more: red, green, blue */
 #define SLOT_REFLECTED 27    /* and two more */
 #define SLOT_RSM 27          /* and two more: position, normal, reflectance */
+#define SLOT_HALF 30
 
 /* Images written by compute passes, and by the drawing of links */
 #define SLOT_OUTPUT 0
+#define SLOT_OUTPUT_HALF 1
 #define SLOT_OUTPUT_LINKS 0
 #define SLOT_OUTPUT_WALLS 1
 #define SLOT_OUTPUT_FIELD 3  /* and two more */
+
+/* Layers of what is marched at half the resolution: colours, and in w */
+#define HALF_DIRECT 0        /* how far the ray went */
+#define HALF_INDIRECT 1      /* 1: it left the media before it met a surface */
+#define HALF_EMISSION 2
+#define HALF_TRANSMITTANCE 3 /* how much of its way is in the world's medium */
+#define HALF_LAYERS 4
+
+/* Rows of blocks of 2 x 2 pixels that are marched once so many rows of pixels are, which is an even
+ * number or all of them: one more than those, which the last row of pixels leans on. */
+#define HALF_ROWS(rows, height)                                                                    \
+    ((rows) == 0 ? 0 : (rows) / 2 + 1 < ((height) + 1) / 2 ? (rows) / 2 + 1 : ((height) + 1) / 2)
 
 /* Cells along a brick's side: the unit of empty-space skipping. */
 #define BRICK_CELLS 8

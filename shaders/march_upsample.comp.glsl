@@ -4,14 +4,15 @@
 #version 450 core
 #include "lib/compose.glsl"
 #include "lib/half.glsl"
+#include "lib/rest.glsl"
 
 layout(local_size_x = GROUP_PIXELS, local_size_y = GROUP_PIXELS) in;
 
 layout(binding = SLOT_HALF) uniform sampler2DArray half_march;
 
 // How well a block's ray, of that pixel, stands for the pixel's: always where both leave the media.
-// Surfaces must each lie on the plane of the other, so that slopes need not be level; a silhouette's
-// own plane holds what is behind it. Two pixels' spacing off is far.
+// Surfaces must each lie on the plane of the other, so that slopes need not be level; a
+// silhouette's own plane holds what is behind it. Two pixels' spacing off is far.
 float likeness(pixel_view view, march_end own, ivec2 pixel, float t, bool leaves, float spacing)
 {
     if (t <= NO_DEPTH)
@@ -28,6 +29,17 @@ float likeness(pixel_view view, march_end own, ivec2 pixel, float t, bool leaves
     }
     off /= 2.0 * spacing;
     return exp(-off * off);
+}
+
+// What is thinner than the blocks' grid, or ends between its rays, is left to march_rest: a wire
+// before bright fog must not take the fog's light in three samples of four. In a dispatch of its
+// own, since these few would hold up the others of their groups.
+void leave(ivec2 pixel)
+{
+    uint number = atomicAdd(rest_count, 1u);
+    rest_pixels[number] = uint(pixel.x) | uint(pixel.y) << 16;
+    if (number % GROUP_REST == 0u && number < GROUP_REST * 65535u)
+        atomicAdd(rest_groups[0], 1u);
 }
 
 // False where no block's ray is like the pixel's.
@@ -80,11 +92,8 @@ void main()
     media_spans spans = spans_of(view.ray, view.t_near, view.t_far);
     march_end own = end_of(spans, view.t_far);
     march_state state = march_state(vec3(0.0), vec3(0.0), vec3(0.0), vec3(1.0));
-    // What is thinner than the blocks' grid, or ends between its rays, is marched itself: a wire
-    // before bright fog must not take the fog's light in three samples of four.
-    if (own.t > NO_DEPTH && !upsample(pixel, view, own, state)) {
-        state = march_state(vec3(0.0), vec3(0.0), vec3(0.0), vec3(1.0));
-        march_media(state, view.ray, spans, pixel);
-    }
-    compose(pixel, view, state);
+    if (own.t > NO_DEPTH && !upsample(pixel, view, own, state))
+        leave(pixel);
+    else
+        compose(pixel, view, state);
 }

@@ -264,7 +264,8 @@ static brume_result work_shade(struct run *run)
 static brume_result work_march(struct run *run)
 {
     const vec4 march = run->renderer->frame.march;
-    return view_march(run->gpu, &run->request->view, (int)march.z, (int)march.w);
+    const struct render_request *request = run->request;
+    return view_march(run->gpu, request->targets, &request->view, (int)march.z, (int)march.w);
 }
 
 /* Reads the mean of the samples so far and makes it the newest picture. */

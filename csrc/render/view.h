@@ -8,8 +8,9 @@
 /* What a job draws into, from its first sample to its last. */
 struct view_targets {
     struct texture normal, diffuse, specular, emission, tint, depth, surface;
-    struct texture half; /* where the view wants half_march */
     struct buffer accumulation;
+    struct texture half; /* these two where the view wants half_march */
+    struct buffer rest;  /* groups, count, places of pixels that the texture tells nothing of */
     GLuint framebuffer, tint_framebuffer;
     bool busy;                 /* a job's; others are free to take */
     struct view_targets *next; /* of the pool */
@@ -18,8 +19,10 @@ struct view_targets {
 /* Bytes of a pixel: five attachments, depth, the surfaces' radiance, and a vec4 a pass. */
 #define VIEW_PIXEL_BYTES 68
 #define VIEW_PASS_PIXEL_BYTES 16
-/* And of a block of 2 x 2 pixels that is marched as one. */
+/* With half_march also of a block of 2 x 2 pixels, of each pixel, and before those. */
 #define VIEW_HALF_BLOCK_BYTES 64
+#define VIEW_REST_PIXEL_BYTES 4
+#define VIEW_REST_BYTES 16
 
 uint64_t view_bytes(const brume_view *view);
 /* Bytes of the pool's targets: of those that jobs hold, or of the idle ones. */
@@ -41,7 +44,8 @@ brume_result view_gbuffer(struct gpu *gpu, struct view_targets *targets, struct 
  * first to the one before the end, multiples of GROUP_PIXELS but for the picture's own end. */
 void view_bind(const struct view_targets *targets);
 brume_result view_shade(struct gpu *gpu, const brume_view *view, int first, int end);
-brume_result view_march(struct gpu *gpu, const brume_view *view, int first, int end);
+brume_result view_march(struct gpu *gpu, const struct view_targets *targets, const brume_view *view,
+                        int first, int end);
 
 /* The passes as floats in main memory. */
 struct picture {

@@ -24,6 +24,8 @@ typedef struct mat4 { float m[16]; } mat4;
 #define GROUP_LANES 8
 #define GROUP_CELLS 4
 
+#define GROUP_REST 64    /* 64 x 1 x 1: pixels from a list */
+
 /* Uniform blocks */
 #define SLOT_FRAME 0
 #define SLOT_STAGE 1
@@ -36,6 +38,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_INSTANCES 4
 #define SLOT_ACCUMULATION 5
 #define SLOT_DEPTH_SOURCES 6
+#define SLOT_REST 6
 #define SLOT_DEPTH_GROUPS 7
 #define SLOT_POWERS 8
 

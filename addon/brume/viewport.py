@@ -339,6 +339,7 @@ class View:
         return Wish(self.stage.serial, self.stage_name, framing.of(context, scene_eval),
                     engine.get_preview_pixel_size(depsgraph.scene), settings.viewport_samples,
                     (bytes(native_settings(settings)), settings.seed,
+                     settings.half_resolution_volumes,
                      scene_eval.render.filter_size, scene_eval.render.film_transparent))
 
     def _next_task(self, target_s):
@@ -377,6 +378,7 @@ class View:
             samples=task.samples, seed=scene_eval.brume.seed, passes=1,
             filter_width=scene_eval.render.filter_size,
             film_transparent=scene_eval.render.film_transparent,
+            half_march=scene_eval.brume.half_resolution_volumes,
             progressive=task.samples > 1, urgent=task.look,
             world_draws=_ROUGH_WORLD_DRAWS if task.rough else 0)
         with self.stage.lock:

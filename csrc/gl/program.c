@@ -244,3 +244,11 @@ void program_dispatch(const struct program *program, int x, int y, int z)
                       (GLuint)((y + group[1] - 1) / group[1]),
                       (GLuint)((z + group[2] - 1) / group[2]));
 }
+
+void program_dispatch_indirect(const struct program *program, GLuint buffer)
+{
+    glUseProgram(program->id);
+    glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, buffer);
+    glDispatchComputeIndirect(0);
+    glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, 0);
+}

@@ -36,6 +36,8 @@ brume_result program_draw(struct program_cache *cache, const char *stem,
 
 /* Dispatches so that at least x * y * z threads run. */
 void program_dispatch(const struct program *program, int x, int y, int z);
+/* Dispatches as many groups as stand at the buffer's start. */
+void program_dispatch_indirect(const struct program *program, GLuint buffer);
 
 /* The text of one shader file with its includes, malloc; for the tests too. */
 brume_result shader_load(const char *folder, const char *name, char **text);

@@ -255,20 +255,17 @@ static brume_result work_gbuffer(struct run *run)
                         request->sample);
 }
 
-static int rows_to_do(const struct run *run)
-{
-    const vec4 march = run->renderer->frame.march;
-    return (int)(march.w - march.z);
-}
-
 static brume_result work_shade(struct run *run)
 {
-    return view_shade(run->gpu, &run->request->view, rows_to_do(run));
+    const vec4 march = run->renderer->frame.march;
+    return view_shade(run->gpu, &run->request->view, (int)march.z, (int)march.w);
 }
 
 static brume_result work_march(struct run *run)
 {
-    return view_march(run->gpu, &run->request->view, rows_to_do(run));
+    const vec4 march = run->renderer->frame.march;
+    const struct render_request *request = run->request;
+    return view_march(run->gpu, request->targets, &request->view, (int)march.z, (int)march.w);
 }
 
 /* Reads the mean of the samples so far and makes it the newest picture. */

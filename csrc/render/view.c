@@ -113,18 +113,39 @@ static uint64_t accumulation_bytes(const brume_view *view)
            (VIEW_PASS_PIXEL_BYTES * (uint64_t)pass_count(view));
 }
 
+/* The sides of the texture of half_march, in blocks. */
+static int half_side(int32_t pixels)
+{
+    return texture_side((pixels + 1) / 2);
+}
+
+static uint64_t half_bytes(const brume_view *view)
+{
+    return view->half_march ? (uint64_t)half_side(view->width) * (uint64_t)half_side(view->height) *
+                                  VIEW_HALF_BLOCK_BYTES
+                            : 0;
+}
+
+static uint64_t rest_bytes(const brume_view *view)
+{
+    return view->half_march ? VIEW_REST_BYTES + (uint64_t)view->width * (uint64_t)view->height *
+                                                    VIEW_REST_PIXEL_BYTES
+                            : 0;
+}
+
 uint64_t view_bytes(const brume_view *view)
 {
     return (uint64_t)texture_side(view->width) * (uint64_t)texture_side(view->height) *
                VIEW_PIXEL_BYTES +
-           accumulation_bytes(view);
+           half_bytes(view) + rest_bytes(view) + accumulation_bytes(view);
 }
 
 static uint64_t held_bytes(const struct view_targets *targets)
 {
     return targets->normal.bytes + targets->diffuse.bytes + targets->specular.bytes +
            targets->emission.bytes + targets->tint.bytes + targets->depth.bytes +
-           targets->surface.bytes + targets->accumulation.bytes;
+           targets->surface.bytes + targets->half.bytes + targets->rest.bytes +
+           targets->accumulation.bytes;
 }
 
 uint64_t view_pool_bytes(const struct view_targets *pool, bool busy)
@@ -146,6 +167,8 @@ static void destroy(struct gpu *gpu, struct view_targets *targets)
     texture_finish(memory, &targets->tint);
     texture_finish(memory, &targets->depth);
     texture_finish(memory, &targets->surface);
+    texture_finish(memory, &targets->half);
+    buffer_finish(memory, &targets->rest);
     buffer_finish(memory, &targets->accumulation);
     glDeleteFramebuffers(1, &targets->framebuffer);
     glDeleteFramebuffers(1, &targets->tint_framebuffer);
@@ -186,6 +209,13 @@ static brume_result create(struct gpu *gpu, struct view_targets *targets, const 
         GL_FRAMEBUFFER_COMPLETE)
         return fail(BRUME_E_GPU, "the driver refuses a %d x %d framebuffer", view->width,
                     view->height);
+    if (view->half_march) {
+        TRY(texture_init(&gpu->memory, &targets->half, FOR_TARGET, GL_TEXTURE_2D_ARRAY, GL_RGBA32F,
+                         half_side(view->width), half_side(view->height), HALF_LAYERS, 1,
+                         "media at half the resolution"));
+        TRY(buffer_init(&gpu->memory, &targets->rest, FOR_TARGET, rest_bytes(view), NULL,
+                        "pixels to march"));
+    }
     return buffer_init(&gpu->memory, &targets->accumulation, FOR_TARGET, accumulation_bytes(view),
                        NULL, "accumulation");
 }
@@ -194,6 +224,7 @@ static bool fits(const struct view_targets *targets, const brume_view *view)
 {
     return targets->normal.width == texture_side(view->width) &&
            targets->normal.height == texture_side(view->height) &&
+           targets->half.bytes == half_bytes(view) && targets->rest.bytes == rest_bytes(view) &&
            targets->accumulation.bytes == accumulation_bytes(view);
 }
 
@@ -276,23 +307,53 @@ void view_bind(const struct view_targets *targets)
     glBindTextureUnit(SLOT_GBUFFER_TINT, targets->tint.id);
     glBindTextureUnit(SLOT_SURFACE, targets->surface.id);
     glBindImageTexture(SLOT_OUTPUT, targets->surface.id, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+    if (targets->half.id) {
+        glBindTextureUnit(SLOT_HALF, targets->half.id);
+        glBindImageTexture(SLOT_OUTPUT_HALF, targets->half.id, 0, GL_TRUE, 0, GL_WRITE_ONLY,
+                           GL_RGBA32F);
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_REST, targets->rest.id);
+    }
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ACCUMULATION, targets->accumulation.id);
 }
 
-brume_result view_shade(struct gpu *gpu, const brume_view *view, int rows)
+brume_result view_shade(struct gpu *gpu, const brume_view *view, int first, int end)
 {
     const struct program *program;
     TRY(program_compute(&gpu->programs, "shade", &program));
-    program_dispatch(program, view->width, rows, 1);
+    program_dispatch(program, view->width, end - first, 1);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     return BRUME_OK;
 }
 
-brume_result view_march(struct gpu *gpu, const brume_view *view, int rows)
+/* The rays of blocks, the pixels between them, and those that no block stands for. */
+static brume_result march_half(struct gpu *gpu, const struct view_targets *targets,
+                               const brume_view *view, int first, int end)
 {
+    static const GLuint none[4] = {0, 1, 1, 0}; /* groups, and pixels */
+    const int rows = HALF_ROWS(end, view->height) - HALF_ROWS(first, view->height);
+    const struct program *blocks, *upsample, *rest;
+    TRY(program_compute(&gpu->programs, "march_half", &blocks));
+    TRY(program_compute(&gpu->programs, "march_upsample", &upsample));
+    TRY(program_compute(&gpu->programs, "march_rest", &rest));
+    if (rows > 0)
+        program_dispatch(blocks, (view->width + 1) / 2, rows, 1);
+    glNamedBufferSubData(targets->rest.id, 0, sizeof none, none);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    program_dispatch(upsample, view->width, end - first, 1);
+    glMemoryBarrier(GL_COMMAND_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    program_dispatch_indirect(rest, targets->rest.id);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    return BRUME_OK;
+}
+
+brume_result view_march(struct gpu *gpu, const struct view_targets *targets, const brume_view *view,
+                        int first, int end)
+{
+    if (view->half_march)
+        return march_half(gpu, targets, view, first, end);
     const struct program *program;
     TRY(program_compute(&gpu->programs, "march", &program));
-    program_dispatch(program, view->width, rows, 1);
+    program_dispatch(program, view->width, end - first, 1);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     return BRUME_OK;
 }

@@ -9,6 +9,8 @@
 struct view_targets {
     struct texture normal, diffuse, specular, emission, tint, depth, surface;
     struct buffer accumulation;
+    struct texture half; /* these two where the view wants half_march */
+    struct buffer rest;  /* groups, count, places of pixels that the texture tells nothing of */
     GLuint framebuffer, tint_framebuffer;
     bool busy;                 /* a job's; others are free to take */
     struct view_targets *next; /* of the pool */
@@ -17,6 +19,10 @@ struct view_targets {
 /* Bytes of a pixel: five attachments, depth, the surfaces' radiance, and a vec4 a pass. */
 #define VIEW_PIXEL_BYTES 68
 #define VIEW_PASS_PIXEL_BYTES 16
+/* With half_march also of a block of 2 x 2 pixels, of each pixel, and before those. */
+#define VIEW_HALF_BLOCK_BYTES 64
+#define VIEW_REST_PIXEL_BYTES 4
+#define VIEW_REST_BYTES 16
 
 uint64_t view_bytes(const brume_view *view);
 /* Bytes of the pool's targets: of those that jobs hold, or of the idle ones. */
@@ -34,10 +40,12 @@ void view_frame(const brume_view *view, uint32_t sample, struct gpu_frame *frame
 
 brume_result view_gbuffer(struct gpu *gpu, struct view_targets *targets, struct geometry *geometry,
                           const brume_view *view, uint32_t sample);
-/* For the two below, once the G-buffer is drawn; they do the rows that stand in the frame. */
+/* For the two below, once the G-buffer is drawn; they do the rows that stand in the frame: from the
+ * first to the one before the end, multiples of GROUP_PIXELS but for the picture's own end. */
 void view_bind(const struct view_targets *targets);
-brume_result view_shade(struct gpu *gpu, const brume_view *view, int rows);
-brume_result view_march(struct gpu *gpu, const brume_view *view, int rows);
+brume_result view_shade(struct gpu *gpu, const brume_view *view, int first, int end);
+brume_result view_march(struct gpu *gpu, const struct view_targets *targets, const brume_view *view,
+                        int first, int end);
 
 /* The passes as floats in main memory. */
 struct picture {

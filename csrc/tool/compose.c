@@ -262,6 +262,7 @@ bool compose_view(const options *given, const compose_box *box, brume_view *out)
         .samples = (uint32_t)given->samples,
         .seed = given->seed,
         .film_transparent = given->transparent,
+        .half_march = given->half_march,
         .passes = given->passes | 1u << BRUME_PASS_COMBINED,
     };
     const float *axes[3] = {right, up, back};

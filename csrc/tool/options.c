@@ -66,6 +66,8 @@ static const char help[] =
     "      --light-samples N       shadow maps spread over each lamp (default: 8)\n"
     "      --world-samples N       directions that stand for the world's light (default: 128)\n"
     "      --step X                march step in cells of the medium (default: 1)\n"
+    "      --half-march            march one ray for 2 x 2 pixels: the view takes a third of the\n"
+    "                              time or less, and fine detail of the medium is softer\n"
     "      --depths WAY            optical depths to the lamps: propagated (the default), marched\n"
     "                              (exact, slower); corrected or paper, to compare\n"
     "      --method METHOD         opv: light that media scatter once (the default); lpv: and what\n"
@@ -482,6 +484,7 @@ static const struct spec specs[] = {
     {"light-samples", KIND_COUNT, AT(settings.light_samples), .upper = 4096},
     {"world-samples", KIND_COUNT, AT(settings.world_samples), .upper = 4096},
     {"step", KIND_NUMBER, AT(settings.step), .lower = 0.01f, .upper = 100.0f},
+    {"half-march", KIND_FLAG, AT(half_march)},
     {"method", KIND_OWN, .parse = parse_method},
     {"field-resolution", KIND_COUNT, AT(settings.field_resolution), .upper = 256},
     {"iterations", KIND_COUNT, AT(settings.iterations), .upper = 100000},

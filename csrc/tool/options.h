@@ -40,7 +40,7 @@ typedef struct options {
     brume_settings settings;
     int32_t samples; /* 0: the library's default */
     uint32_t seed, passes;
-    bool transparent;
+    bool transparent, half_march;
 } options;
 
 /* Reads the command line. true where there is work to do; else *exit_code is what the program ends

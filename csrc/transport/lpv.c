@@ -55,7 +55,7 @@ static brume_result make(struct lpv_work *work)
     TRY(texture_init(&work->input->gpu->memory, &work->links, FOR_TRANSPORT, GL_TEXTURE_3D,
                      GL_R32UI, texture_side(dims.x + 2), texture_side(dims.y + 2),
                      texture_side(dims.z + 2), 1, "cut links")); /* of the cells around, too */
-    return lattice_texture(work, &work->walls, GL_R32UI, 4, "surfaces' reflectances");
+    return lattice_texture(work, &work->walls, GL_R32UI, WALL_TEXELS, "surfaces' reflectances");
 }
 
 static void finish(struct lpv_work *work)
@@ -209,6 +209,7 @@ static brume_result hand_over(struct lpv_work *work, struct transport *transport
     TRY(program_compute(&input->gpu->programs, "lpv_finish", &program));
     bind_textures(SLOT_FLOW, work->sums);
     glBindTextureUnit(SLOT_LINKS, work->links.id);
+    glBindTextureUnit(SLOT_WALLS, work->walls.id);
     glBindImageTexture(SLOT_OUTPUT, transport->field.id, 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA32F);
     program_dispatch(program, dims.x, dims.y, dims.z);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);

@@ -27,16 +27,38 @@ bool is_cut(vec2 cuts, ivec3 offset)
     return false;
 }
 
+ivec3 of_cell(ivec3 cell)
+{
+    return cell + ivec3(3 * frame.field_dims.x, 0, 0);
+}
+
+// The cell on whose side of the surfaces a point is: the nearest, or along an axis the one that no
+// cut lies before. `low`: the cell before it on all axes, f: how far it is on the way to the next.
+ivec3 home_of(ivec3 low, vec3 f, ivec3 last)
+{
+    ivec3 home = low + ivec3(step(0.5, f));
+    for (int axis = 0; axis < 3; ++axis) {
+        ivec3 before = home;
+        before[axis] = low[axis];
+        if (any(lessThan(before, ivec3(0))) || any(greaterThan(before, last)))
+            continue;
+        uint where = uint(texelFetch(field_lattice, of_cell(before), 0).z) >> (8 * axis) & 255u;
+        if (where != 0u)
+            home[axis] = low[axis] + (f[axis] * 253.0 + 1.0 < float(where) + 0.5 ? 0 : 1);
+    }
+    return clamp(home, ivec3(0), last);
+}
+
 // Interpolated between the eight cells around a point, but for those that a surface parts from the
-// cell that it is in, and those not before the plane (xyz: normal, w: the product with its points).
+// cell that it belongs to, and those not before the plane (xyz: normal, w: the product with its points).
 field_light field_between(vec3 p, vec4 plane)
 {
     vec3 at = (p - frame.field_lower.xyz) / frame.field_lower.w - 0.5;
     ivec3 last = frame.field_dims.xyz - 1;
-    ivec3 home = clamp(ivec3(round(at)), ivec3(0), last);
-    vec2 cuts = texelFetch(field_lattice, home + ivec3(3 * frame.field_dims.x, 0, 0), 0).xy;
     ivec3 low = ivec3(floor(at));
     vec3 f = at - vec3(low);
+    ivec3 home = home_of(low, f, last);
+    vec2 cuts = texelFetch(field_lattice, of_cell(home), 0).xy;
     field_light light = field_light(vec3(0.0), mat3(0.0));
     float sum = 0.0;
     for (int corner = 0; corner < 8; ++corner) {
@@ -54,9 +76,15 @@ field_light field_between(vec3 p, vec4 plane)
             light.flux[c] += weight * texel.yzw;
         }
     }
-    if (sum > 0.0) {
+    if (sum > 1e-3) {
         light.fluence /= sum;
         light.flux /= sum;
+        return light;
+    }
+    for (int c = 0; c < 3; ++c) {
+        vec4 texel = texelFetch(field_lattice, home + ivec3(c * frame.field_dims.x, 0, 0), 0);
+        light.fluence[c] = texel.x;
+        light.flux[c] = texel.yzw;
     }
     return light;
 }

@@ -24,6 +24,8 @@ typedef struct mat4 { float m[16]; } mat4;
 #define GROUP_LANES 8
 #define GROUP_CELLS 4
 
+#define GROUP_REST 64    /* 64 x 1 x 1: pixels from a list */
+
 /* Uniform blocks */
 #define SLOT_FRAME 0
 #define SLOT_STAGE 1
@@ -36,6 +38,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_INSTANCES 4
 #define SLOT_ACCUMULATION 5
 #define SLOT_DEPTH_SOURCES 6
+#define SLOT_REST 6
 #define SLOT_DEPTH_GROUPS 7
 #define SLOT_POWERS 8
 
@@ -69,12 +72,30 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_REFLECTED 27    /* and two more */
 #define SLOT_RSM 27          /* and two more: position, normal, reflectance */
 #define SLOT_BLOCKED 30
+#define SLOT_HALF 31
 
 /* Images written by compute passes, and by the drawing of links */
 #define SLOT_OUTPUT 0
+#define SLOT_OUTPUT_HALF 1
 #define SLOT_OUTPUT_LINKS 0
 #define SLOT_OUTPUT_WALLS 1
 #define SLOT_OUTPUT_FIELD 3  /* and two more */
+
+/* Layers of what is marched at half the resolution: colours, and in w */
+#define HALF_DIRECT 0        /* how far the ray went */
+#define HALF_INDIRECT 1      /* 1: it left the media before it met a surface */
+#define HALF_EMISSION 2
+#define HALF_TRANSMITTANCE 3 /* how much of its way is in the world's medium */
+#define HALF_LAYERS 4
+
+/* Rows of blocks of 2 x 2 pixels that are marched once so many rows of pixels are, which is an even
+ * number or all of them: one more than those, which the last row of pixels leans on. */
+#define HALF_ROWS(rows, height)                                                                    \
+    ((rows) == 0 ? 0 : (rows) / 2 + 1 < ((height) + 1) / 2 ? (rows) / 2 + 1 : ((height) + 1) / 2)
+
+/* Texels of a cell in the picture of its surfaces: sums of their reflectances and a count, and for the
+ * links along the three axes how far along the last cut is, in 1/254, from 1; 0: there is none. */
+#define WALL_TEXELS 7
 
 /* Cells along a brick's side: the unit of empty-space skipping. */
 #define BRICK_CELLS 8

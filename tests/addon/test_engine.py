@@ -72,6 +72,19 @@ def test_last_stats(scene, render):
     assert stats.samples == scene.brume.samples
 
 
+def test_half_resolution_arrives(scene, render, monkeypatch):
+    lit(scene)
+    views, asked = [], native.Scene.render
+    monkeypatch.setattr(native.Scene, "render", lambda self, settings, view: (
+        views.append(view.half_march), asked(self, settings, view))[1])
+    whole = render()
+    scene.brume.half_resolution_volumes = True
+    half = render("b")
+    assert views == [0, 1]
+    assert not np.array_equal(half, whole)
+    np.testing.assert_allclose(half.mean(axis=(0, 1)), whole.mean(axis=(0, 1)), rtol=0.02)
+
+
 def test_zero_scale_leaves_the_rest(scene, render, reported):
     lit(scene)
     whole = render()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pictures that are compared with Cycles: a scene, the lamps that are lit, and a tolerance.
 
-All but those of LPV are direct light and single scattering only. Cycles' samples are chosen so that its own noise
-stays below a quarter of the tolerance; the tests assert that too.
+All but those of LPV are direct light and single scattering only. Cycles' samples are chosen so that
+its own noise stays below a quarter of the tolerance; the tests assert that too.
 """
 import os
 from dataclasses import dataclass

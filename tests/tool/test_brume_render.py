@@ -131,6 +131,15 @@ def test_same_command_same_pixels(run, smoke, tmp_path):
     assert np.array_equal(combined(tmp_path / "a.exr"), combined(tmp_path / "b.exr"))
 
 
+def test_half_march(run, smoke, tmp_path):
+    for name, options in (("a.exr", ()), ("b.exr", ("--half-march",))):
+        done = run(*SMALL, *options, "-o", name, smoke)
+        assert done.returncode == 0, done.stderr
+    whole, half = combined(tmp_path / "a.exr"), combined(tmp_path / "b.exr")
+    assert not np.array_equal(whole, half)
+    np.testing.assert_allclose(half[..., :3].mean(), whole[..., :3].mean(), rtol=0.05)
+
+
 def test_more_light_more_radiance(run, smoke, tmp_path):
     for name, irradiance in (("a.exr", "1"), ("b.exr", "4")):
         assert run(*SMALL, "--sun", "0.2,1,-0.5", "--irradiance", irradiance, "-o", name,

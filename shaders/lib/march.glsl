@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A view ray through the media: in-scattered and emitted light, transmittance.
+#include "lib/transmittance.glsl"
+#include "lib/shadow.glsl"
+#include "lib/sky.glsl"
+#include "lib/field.glsl"
+#include "lib/phase.glsl"
+
+layout(binding = SLOT_GBUFFER_NORMAL) uniform sampler2D gbuffer_normal;
+
+// A pixel's ray as far as it is seen: to the first surface, or to the far plane.
+struct pixel_view
+{
+    view_ray ray;
+    vec4 normal_depth;
+    float t_near, t_far;
+    bool hit;
+};
+
+pixel_view view_of(ivec2 pixel)
+{
+    pixel_view view;
+    view.ray = pixel_ray(pixel);
+    view.normal_depth = texelFetch(gbuffer_normal, pixel, 0);
+    view.hit = view.normal_depth.w > NO_DEPTH;
+    view.t_near = frame.clip.x * view.ray.stretch;
+    view.t_far = (view.hit ? view.normal_depth.w : frame.clip.y) * view.ray.stretch;
+    return view;
+}
+
+struct march_state
+{
+    vec3 direct;        // in-scattered: the lights' own light
+    vec3 indirect;      // and what was scattered or reflected before
+    vec3 emission;
+    vec3 transmittance;
+};
+
+// Mean of 1/d^2 over [t0, t1] of a ray whose nearest approach to a point, at distance h, is at
+// t = 0: the exact integral, so that a lamp in the fog makes no bright cell and no banding.
+float mean_inverse_square(float t0, float t1, float h)
+{
+    float x = t0 / h, y = t1 / h;
+    // atan(y) - atan(x), without cancellation far from the lamp.
+    float angle = atan((y - x), 1.0 + x * y);
+    if (angle < 0.0)
+        angle += PI;
+    return angle / (h * (t1 - t0));
+}
+
+// The distance from the ray that mean_inverse_square wants, and in `along` the point's place on the
+// ray. The light of a point or spot is that of a disk that faces whom it lights, as in Cycles:
+// 2 (1 - d / sqrt(d^2 + r^2)) / r^2 instead of 1/d^2, which is 1 / (d^2 + 0.7 r^2) within 5 % from
+// d = r / 2 on. Samples strewn over the lamp would each have a bright core of their own.
+float nearest_approach(gpu_light light, gpu_light_sample s, view_ray ray, out float along)
+{
+    bool disk = light.info.x == uint(LIGHT_POINT) || light.info.x == uint(LIGHT_SPOT);
+    vec3 v = (disk ? light.position.xyz : s.position.xyz) - ray.origin;
+    along = dot(v, ray.direction);
+    vec3 off = v - along * ray.direction;
+    float soft = disk ? 0.7 * light.position.w * light.position.w : 0.0;
+    return sqrt(max(dot(off, off) + soft, 1e-8));
+}
+
+// The medium at one step of the ray: lattice and fog together.
+struct medium_step
+{
+    vec3 sigma_s, sigma_t, emission;
+    float g;
+};
+
+// False where the step is empty; `skipped` more steps then are too.
+bool look_up(view_ray ray, float t, float dt, float within, bool in_lattice, bool emission,
+             out medium_step m, out int skipped)
+{
+    m = medium_step(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    skipped = 0;
+    bool fog = fog_exists();
+    if (in_lattice) {
+        vec3 p = ray.origin + ray.direction * t;
+        float skip = medium_skip(p, ray.direction);
+        if (skip > 0.0) {
+            if (!fog) {
+                skipped = medium_steps_to_skip(skip, dt, within);
+                return false;
+            }
+        } else {
+            vec3 uvw = medium_coordinate(p);
+            vec4 scatter = textureLod(medium_scatter, uvw, 0.0);
+            m.sigma_s = scatter.rgb;
+            m.g = scatter.a;
+            m.sigma_t = textureLod(medium_extinct, uvw, 0.0).rgb;
+            if (emission && frame.medium_upper.w != 0.0)
+                m.emission = textureLod(medium_emission, uvw, 0.0).rgb;
+        }
+    }
+    if (fog) {
+        float here = luminance(m.sigma_s), there = luminance(frame.fog_sigma_s.rgb);
+        m.g = (here * m.g + there * frame.fog_sigma_s.w) / max(here + there, 1e-30);
+        m.sigma_s += frame.fog_sigma_s.rgb;
+        m.sigma_t += frame.fog_sigma_t.rgb;
+        m.emission += frame.fog_emission.rgb;
+    }
+    return m.sigma_t != vec3(0.0) || m.emission != vec3(0.0);
+}
+
+// Integral of exp(-sigma_t s) over the step; its limit where the medium is thin.
+vec3 step_weight(vec3 sigma_t, vec3 through, float dt)
+{
+    return mix((1.0 - through) / max(sigma_t, vec3(1e-12)), vec3(dt),
+               lessThan(sigma_t * dt, vec3(1e-4)));
+}
+
+// What is left behind this could no longer be told from black.
+bool is_black(vec3 transmittance)
+{
+    return max(max(transmittance.r, transmittance.g), transmittance.b) < 1e-4;
+}
+
+// Each step has a jitter of its own: the errors of a ray's steps then cancel one another.
+float step_jitter(float jitter, int k)
+{
+    return fract(jitter + float(k) * 0.754877666);
+}
+
+// What one lamp adds along the steps from first to end, which start at t_start. Lamps are the outer
+// loop: their data are read once a ray.
+vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, float dt, int first,
+                int end, bool in_lattice, ivec2 pixel, float jitter)
+{
+    gpu_light light = lights[number];
+    uint turn = (uint(frame.size.z) + pixel_hash(pixel, number)) % light.samples.y;
+    gpu_light_sample light_sample = light_samples[light.samples.x + turn];
+    bool sun = light.info.x == uint(LIGHT_SUN);
+    float along;
+    float h = nearest_approach(light, light_sample, ray, along);
+    vec3 sum = vec3(0.0);
+    for (int k = first; k < end; ++k) {
+        float within = step_jitter(jitter, k);
+        float t0 = t_start + float(k) * dt;
+        float t = t0 + within * dt;
+        medium_step m;
+        int skipped;
+        if (!look_up(ray, t, dt, within, in_lattice, false, m, skipped)) {
+            k += skipped;
+            continue;
+        }
+        vec3 through = exp(-m.sigma_t * dt);
+        vec3 p = ray.origin + ray.direction * t;
+        vec3 towards;
+        float square;
+        vec3 light_here = light_intensity(light, light_sample.position.xyz, p, towards, square);
+        float distance = sun ? 1e30 : sqrt(square);
+        if (light_here != vec3(0.0))
+            light_here *= light_shadow_medium(light, light_sample, p, distance);
+        if (light_here != vec3(0.0)) {
+            if (!sun)
+                light_here *= mean_inverse_square(t0 - along, t0 + dt - along, h);
+            sum += transmittance * step_weight(m.sigma_t, through, dt) * m.sigma_s * light_here *
+                   (phase_hg(dot(towards, ray.direction), m.g) *
+                    light_transmittance(light, p, towards, distance));
+        }
+        transmittance *= through;
+    }
+    return sum * light.factors.z;
+}
+
+// Transmittance, emission, the world's light and the lamps' along the stretch.
+void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_lattice,
+           ivec2 pixel, float jitter)
+{
+    vec3 transmittance = state.transmittance;
+    float dt = (span.y - span.x) / float(count);
+    // The sky's lattice is coarser than a step.
+    float sky_every = max(frame.sky_lower.w, dt);
+    float sky_next = -1e30;
+    vec3 sky = vec3(0.0);
+    // So is the field's, whose look-ups are dear.
+    float field_every = max(0.5 * frame.field_lower.w, dt);
+    float field_next = -1e30;
+    vec3 field = vec3(0.0);
+    int first = count, end = 0; // the steps that are not empty
+    for (int k = 0; k < count; ++k) {
+        float within = step_jitter(jitter, k);
+        float t = span.x + (float(k) + within) * dt;
+        medium_step m;
+        int skipped;
+        if (!look_up(ray, t, dt, within, in_lattice, true, m, skipped)) {
+            k += skipped;
+            continue;
+        }
+        first = min(first, k);
+        end = k + 1;
+        vec3 through = exp(-m.sigma_t * dt);
+        vec3 weight = transmittance * step_weight(m.sigma_t, through, dt);
+        if (frame.sky_dims.w != 0 && frame.paths.x != 0) {
+            if (t >= sky_next) {
+                sky = sky_scatter(ray.origin + ray.direction * t, -ray.direction, m.g);
+                sky_next = t + sky_every;
+            }
+            state.direct += weight * m.sigma_s * sky;
+        }
+        if (field_exists() && frame.paths.y != 0) {
+            if (t >= field_next) {
+                field = field_scatter(ray.origin + ray.direction * t, -ray.direction, m.g);
+                field_next = t + field_every;
+            }
+            state.indirect += weight * m.sigma_s * field;
+        }
+        state.emission += weight * m.emission;
+        transmittance *= through;
+        if (is_black(transmittance)) {
+            transmittance = vec3(0.0);
+            break;
+        }
+    }
+    if (first < end && frame.paths.x != 0)
+        for (uint i = 0u; i < frame.counts.x; ++i)
+            state.direct += march_lamp(i, state.transmittance, ray, span.x, dt, first, end,
+                                       in_lattice, pixel, jitter);
+    state.transmittance = transmittance;
+}
+
+// The stretches of a ray in media: in the world's alone before the lattice, in the lattice's box,
+// and behind it again. Those that end where they begin, or before, are none.
+struct media_spans
+{
+    vec2 before, box, after;
+};
+
+media_spans spans_of(view_ray ray, float t_near, float t_far)
+{
+    vec2 fog = vec2(0.0);
+    if (fog_exists()) {
+        fog = ray_box(ray.origin, ray.direction, frame.fog_lower.xyz, frame.fog_upper.xyz);
+        // Beyond this depth of fog nothing is seen, however far it reaches.
+        vec3 sigma = mix(frame.fog_sigma_t.rgb, vec3(1e30),
+                         equal(frame.fog_sigma_t.rgb, vec3(0.0)));
+        float thinnest = min(min(sigma.r, sigma.g), sigma.b);
+        fog.y = min(fog.y, max(fog.x, t_near) + 12.0 / max(thinnest, 1e-6));
+        fog = vec2(max(fog.x, t_near), min(fog.y, t_far));
+    }
+    media_spans spans = media_spans(fog, vec2(0.0), vec2(0.0));
+    if (medium_exists()) {
+        vec2 box = ray_box(ray.origin, ray.direction, frame.medium_lower.xyz,
+                           frame.medium_upper.xyz);
+        box = vec2(max(box.x, t_near), min(box.y, t_far));
+        if (box.x < box.y)
+            spans = media_spans(vec2(fog.x, min(box.x, fog.y)), box,
+                                vec2(max(box.y, fog.x), fog.y));
+    }
+    return spans;
+}
+
+void march_media(inout march_state state, view_ray ray, media_spans spans, ivec2 pixel)
+{
+    float jitter = pixel_random(pixel, 11u);
+    int fog_steps = int(frame.march.y);
+    vec2 box = spans.box;
+    if (spans.before.x < spans.before.y)
+        march(state, ray, spans.before, fog_steps, false, pixel, jitter);
+    if (box.x < box.y)
+        march(state, ray, box, max(int(ceil((box.y - box.x) / frame.march.x)), 1), true, pixel,
+              jitter);
+    if (spans.after.x < spans.after.y)
+        march(state, ray, spans.after, fog_steps, false, pixel, jitter);
+}

@@ -100,7 +100,7 @@ def reference(case, most):
 def brume(case, kinds):
     """Pictures of (light paths, cells)."""
     return run(case, [{'engine': 'BRUME', 'settings': {
-        'method': 'LPV', 'iterations': 0, 'light_paths': paths, 'lattice_resolution': cells}}
+        'method': 'LPV', 'iterations': 0, 'light_paths': paths, 'field_resolution': cells}}
         for paths, cells in kinds])
 
 

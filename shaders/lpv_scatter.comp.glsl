@@ -101,7 +101,7 @@ float begin(ivec3 cell)
     }
     float power = 0.0;
     for (int c = 0; c < 3; ++c) {
-        imageStore(flow_image[c], cell, leaving_all(flow[c]));
+        imageStore(flow_image[c], cell, lobe_of(flow[c]));
         power += max(flow[c].x, 0.0);
     }
     return power;

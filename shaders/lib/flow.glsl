@@ -1,22 +1,41 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light in flight from a cell: its power and its flux, spherical harmonics of bands 0 and 1, a
-// colour. It leaves as WEIGHTS say, and where that would be less than nothing, not at all.
+// Light in flight from a cell. What is gathered is its power and its flux, spherical harmonics of
+// bands 0 and 1 a colour; what is kept is the lobe that it leaves by: exp(K u) times a scale, with the
+// mean cosine that the flux tells (von Mises and Fisher's distribution). The two bands themselves
+// would be less than nothing backwards, as soon as the flux is a third of the power, and cutting that
+// off turns nearly half of a beam's flux aside in every cell: the finer the cells, the less far light
+// got.
 #include "lib/links.glsl"
 
-float leaving(vec4 flow, int link_class_number, vec3 direction)
+// 1 less the mean cosine of the sharpest lobe, about Lambert's: sharper ones are seen, as beams between
+// cells' centres on a ceiling. Every hop widens them anew, and hops along the diagonals are longer:
+// measured by the way flown, not by hops, light widens alike in all directions.
+const float LEAST_WIDTH = 0.38;
+const float MEAN_HOP = 1.25; // cells
+
+float leaving(vec4 lobe, int link_class_number, vec3 direction)
 {
-    return max(WEIGHTS[link_class_number] * (flow.x + 3.0 * dot(flow.yzw, direction)), 0.0);
+    return WEIGHTS[link_class_number] * lobe.x * exp(dot(lobe.yzw, direction));
 }
 
-// The same light, scaled so that all that leaves is the power that it holds.
-vec4 leaving_all(vec4 flow)
+// The lobe of a power and flux. What leaves by all links together is the power.
+vec4 lobe_of(vec4 flow)
 {
     if (!(flow.x > 0.0))
         return vec4(0.0);
+    float flux = length(flow.yzw);
+    vec3 axis = flow.yzw / max(flux, 1e-30);
+    float hop = 1.0 / max(max(abs(axis.x), max(abs(axis.y), abs(axis.z))), 0.5);
+    float cosine = min(flux / flow.x, 1.0 - LEAST_WIDTH * (hop / MEAN_HOP));
+    // Banerjee et al., "Clustering on the Unit Hypersphere using von Mises-Fisher Distributions",
+    // JMLR 2005, eq. 4.4, for three dimensions.
+    float sharpness = cosine * (3.0 - cosine * cosine) / (1.0 - cosine * cosine);
+    vec4 lobe = vec4(1.0, axis * sharpness);
     float sum = 0.0;
     for (int i = 0; i < 13; ++i) {
         vec3 direction = vec3(LINKS[i]) / link_length(i);
-        sum += leaving(flow, link_class(i), direction) + leaving(flow, link_class(i), -direction);
+        sum += leaving(lobe, link_class(i), direction) + leaving(lobe, link_class(i), -direction);
     }
-    return flow * (flow.x / max(sum, 1e-30));
+    lobe.x = flow.x / sum;
+    return lobe;
 }

@@ -9,8 +9,8 @@ const ivec3 LINKS[13] =
             ivec3(1, 1, -1), ivec3(1, -1, 1), ivec3(1, -1, -1));
 
 // Shares of a uniform emission: the weights of the quadrature with these 26 points that is exact for
-// polynomials of degree 7 (Lebedev, "Quadratures on a sphere", 1976), so that what bands 0 and 1 send
-// out has the power and the flux that they hold.
+// polynomials of degree 7 (Lebedev, "Quadratures on a sphere", 1976), so that a lobe sends out the power
+// and the flux that it has.
 const float WEIGHTS[3] = float[](1.0 / 21.0, 4.0 / 105.0, 9.0 / 280.0);
 
 // 0 through a face, 1 an edge, 2 a corner.

@@ -116,7 +116,7 @@ void main()
             vec4 field = imageLoad(field_image[c], cell);
             field += vec4(sum.passed[c], sum.passed_flux[c]) * counts;
             imageStore(field_image[c], cell, field);
-            imageStore(flow_image[c], cell, leaving_all(vec4(sum.power[c], sum.flux[c])));
+            imageStore(flow_image[c], cell, lobe_of(vec4(sum.power[c], sum.flux[c])));
         }
         in_flight = sum.power;
     }

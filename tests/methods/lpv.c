@@ -215,17 +215,22 @@ static void light_adds_up(void **state)
             add_lamp(scene, 3 + (uint64_t)k, places[k], watts[i][k]);
         fields[i] = field_of(scene, &settings, NULL);
     }
-    for (int x = 0; x < CELLS; x += 3)
-        for (int y = 0; y < CELLS; y += 3) {
-            const int cell[3] = {x, y, (x + y) % CELLS};
-            for (int color = 0; color < 3; ++color) {
-                const double one = fluence(&fields[0], cell, color);
-                const double other = fluence(&fields[1], cell, color);
-                /* Not exactly: what would leave backwards from a cell is cut off. */
-                assert_close(fluence(&fields[2], cell, color), one + other, 0.02);
-                assert_close(fluence(&fields[3], cell, color), 3.0 * one, 1e-4);
+    double off = 0.0, all = 0.0;
+    for (int x = 0; x < CELLS; ++x)
+        for (int y = 0; y < CELLS; ++y)
+            for (int z = 0; z < CELLS; ++z) {
+                const int cell[3] = {x, y, z};
+                for (int color = 0; color < 3; ++color) {
+                    const double one = fluence(&fields[0], cell, color);
+                    const double both = fluence(&fields[2], cell, color);
+                    off += fabs(one + fluence(&fields[1], cell, color) - both);
+                    all += both;
+                    assert_close(fluence(&fields[3], cell, color), 3.0 * one, 1e-4);
+                }
             }
-        }
+    /* Not exactly: where the light of both meets, it leaves by one lobe for the two. */
+    print_message("two lamps and each alone: %.2f %% off\n", 100.0 * off / all);
+    assert_true(off < 0.01 * all);
     for (int i = 0; i < 4; ++i)
         free(fields[i].texels);
     brume_scene_destroy(scene);
@@ -379,16 +384,15 @@ static void a_turn_changes_little(void **state)
 
 /* --- Furnaces ------------------------------------------------------------------------------- */
 
-/* What scatters all light cannot be seen in an even world. Two bands cannot carry a beam, so that
- * light which flies freely through thin media stays too long in them (docs/methods/lpv.md): with a
- * strong forward lobe that is most of it. In thick media the sky's nodes are coarse at the rim. */
+/* What scatters all light cannot be seen in an even world. In thick media the sky's nodes are coarse at
+ * the rim; of strong forward lobes two bands know the mean alone. */
 static void white_furnace(void **state)
 {
     (void)state;
     static const struct {
         float sigma_s, g;
         double share;
-    } cases[] = {{0.5f, 0.0f, 0.02}, {2.0f, 0.0f, 0.03}, {8.0f, 0.0f, 0.07}, {2.0f, 0.6f, 0.10}};
+    } cases[] = {{0.5f, 0.0f, 0.01}, {2.0f, 0.0f, 0.01}, {8.0f, 0.0f, 0.07}, {2.0f, 0.6f, 0.05}};
     const brume_world world = {.color = {1, 1, 1}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
         const float s = cases[i].sigma_s;

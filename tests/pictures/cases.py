@@ -88,5 +88,5 @@ CASES = {case.name: case for case in (
     Case('environment', (), 0.04, 1024, change='turned_as_texture', groups=ROUND),
     Case('cube', (), 0.05, 512, zoom=1.4, method='LPV'),
     Case('cloud', (), 0.07, 512, zoom=1.15, method='LPV'),
-    Case('room', (), 0.12, 2048, method='LPV'),
+    Case('room', (), 0.10, 2048, method='LPV'),
 )}

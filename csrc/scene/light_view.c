@@ -62,14 +62,14 @@ static void perspective_view(const float eye[3], const float direction[3], const
      * at a cube's corner up to sqrt(6) texels across the map. */
     tangent *= 1.0f + 6.0f / (float)side;
     /* Reversed depth without a far plane: near / distance. */
-    const float projection[16] = {1.0f / tangent, 0, 0, 0, 0, 1.0f / tangent, 0, 0,
-                                  0,              0, 0, -1, 0, 0,             near_, 0};
+    const float projection[16] = {
+        1.0f / tangent, 0, 0, 0, 0, 1.0f / tangent, 0, 0, 0, 0, 0, -1, 0, 0, near_, 0};
     mat4_multiply(projection, view, out->clip_from_world.m);
     out->range = (vec4){0.0f, near_, 0.0f, 2.0f * tangent / (float)side};
 }
 
-void light_view_face(const struct gpu_light *light, const float eye[3], uint32_t face, float tangent,
-                     int side, float near_, struct gpu_shadow_view *out)
+void light_view_face(const struct gpu_light *light, const float eye[3], uint32_t face,
+                     float tangent, int side, float near_, struct gpu_shadow_view *out)
 {
     float u[3], v[3], forward[3], direction[3];
     light_frame(light, u, v, forward);

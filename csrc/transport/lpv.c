@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* LPV: multiple scattering by light carried from cell to cell, after "Light Propagation Volumes with
- * scattering"; docs/methods/lpv.md. Single scattering is OPV's. */
+/* LPV: multiple scattering by light carried from cell to cell, after "Light Propagation Volumes
+ * with scattering"; docs/methods/lpv.md. Single scattering is OPV's. */
 #include "transport/lpv.h"
 #include "base/result.h"
 #include "transport/method.h"
@@ -10,6 +10,7 @@
 
 #define MOST_ITERATIONS 2000
 #define ITERATIONS_A_LOOK 4
+#define USUAL_ITERATIONS 64
 /* Of the power that flies in all, what may be wrong of what is not waited for. */
 #define CONVERGED 0.003
 #define SMALL_REST 0.1
@@ -137,8 +138,9 @@ static brume_result begin(struct lpv_work *work)
 /* What is in flight falls, in the end, by the same ratio in every iteration, everywhere alike: the
  * rest of the series is then known. */
 struct series {
-    double power, ratio, change; /* W in flight; an iteration's to that before it; its last change */
-    double flown;                /* W, all iterations together */
+    double power, ratio,
+        change;   /* W in flight; an iteration's to that before it; its last change */
+    double flown; /* W, all iterations together */
 };
 
 /* Whether the rest is known well enough: not before it is a small part of all, for where it is must
@@ -166,6 +168,10 @@ static brume_result iterate(struct lpv_work *work, int number, bool look, double
         float value;
         int bits;
     } times = {(float)counts};
+    /* Of iterations until it converged nobody knows how many there will be. */
+    const int wanted = work->input->settings->iterations;
+    const int all = wanted > 0 ? wanted : number + USUAL_ITERATIONS;
+    work->passes.done = 1.0f + 0.5f * (float)number / (float)all;
     bind_textures(SLOT_FLOW, work->flow[number % 2]);
     bind_images(SLOT_OUTPUT, work->flow[(number + 1) % 2], GL_WRITE_ONLY, GL_RGBA32F);
     TRY(over_lattice(work, lpv_is_fuzzy(work) ? "lpv_propagate_fuzzy" : "lpv_propagate",
@@ -241,7 +247,7 @@ brume_result lpv_run(struct transport *transport, const struct transport_input *
     }
     struct lpv_work work = {
         .input = input,
-        .passes = {.input = input, .done = 1.0f, .share = 0.5f},
+        .passes = {.input = input, .done = 1.0f}, /* after the depths */
         .media = input->settings->light_paths == BRUME_PATHS_ALL,
     };
     const brume_result result = find(&work, transport);

@@ -9,7 +9,7 @@
 #define LINKS 13
 
 /* As LINKS of shaders/lib/links.glsl. */
-static const int links[LINKS][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 0}, {1, -1, 0},
+static const int links[LINKS][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 0},  {1, -1, 0},
                                     {1, 0, 1},  {1, 0, -1}, {0, 1, 1},  {0, 1, -1}, {1, 1, 1},
                                     {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
 
@@ -35,7 +35,8 @@ static mat4 view_along(const struct gpu_frame *frame, const int link[3], int siz
         view.m[4 * other + row] = (float)(scale * per_m);
         view.m[4 * axis + row] = (float)(-scale * per_m * (double)link[other]);
         view.m[12 + row] = (float)(scale * (origin[other] - (double)link[other] * origin[axis] +
-                                            (double)before + 0.5) - 1.0);
+                                            (double)before + 0.5) -
+                                   1.0);
     }
     const double depth = 1.0 / (double)(dims[axis] + 1);
     view.m[4 * axis + 2] = (float)(depth * per_m);
@@ -49,9 +50,8 @@ static brume_result draw(struct lpv_work *work, GLuint framebuffer)
     const struct transport_input *input = work->input;
     for (int i = 0; i < LINKS; ++i) {
         int size[2];
-        const struct gpu_draw stage = {
-            .clip_from_world = view_along(input->frame, links[i], size),
-            .info = {0, (uint32_t)i, 0, 0}};
+        const struct gpu_draw stage = {.clip_from_world = view_along(input->frame, links[i], size),
+                                       .info = {0, (uint32_t)i, 0, 0}};
         glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_WIDTH, size[0]);
         glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_HEIGHT, size[1]);
         glViewport(0, 0, size[0], size[1]);

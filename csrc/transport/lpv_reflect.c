@@ -7,7 +7,7 @@
 
 #include <math.h>
 
-#define SUN_SIDE 256   /* texels of a map */
+#define SUN_SIDE 256 /* texels of a map */
 #define FACE_SIDE 128
 #define WORLD_SIDE 64
 #define WORLD_MAPS 32  /* at most */
@@ -144,8 +144,8 @@ static brume_result distant(struct lpv_work *work, struct maps *maps, const vec4
     float lower[3], upper[3];
     struct gpu_shadow_view view;
     field_box(input->frame, lower, upper);
-    light_view_distant(input->geometry->lower, input->geometry->upper, lower, upper,
-                       towards, what.w, &view);
+    light_view_distant(input->geometry->lower, input->geometry->upper, lower, upper, towards,
+                       what.w, &view);
     TRY(one_map(work, maps, &view, what, scale));
     return end_sample(work);
 }
@@ -196,8 +196,8 @@ static brume_result all_maps(struct lpv_work *work, struct maps *maps)
     const uint32_t count = input->world_count < WORLD_MAPS ? input->world_count : WORLD_MAPS;
     for (uint32_t s = 0; s < count; ++s) {
         const int sample = (int)(input->world_first + s * input->world_count / count);
-        TRY(distant(work, maps, &input->samples[sample].position, (ivec4){-1, sample, 0, WORLD_SIDE},
-                    (float)input->world_count / (float)count));
+        TRY(distant(work, maps, &input->samples[sample].position,
+                    (ivec4){-1, sample, 0, WORLD_SIDE}, (float)input->world_count / (float)count));
     }
     return BRUME_OK;
 }

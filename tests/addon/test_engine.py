@@ -85,6 +85,37 @@ def test_half_resolution_arrives(scene, render, monkeypatch):
     np.testing.assert_allclose(half.mean(axis=(0, 1)), whole.mean(axis=(0, 1)), rtol=0.02)
 
 
+def test_light_propagation(scene, render, monkeypatch):
+    """More light than single scattering, and each part of it no more than all."""
+    lit(scene)
+    scene.brume.field_resolution = 8
+    asked = []
+    native_render = native.Scene.render
+    monkeypatch.setattr(native.Scene, "render", lambda self, settings, view: (
+        asked.append((settings.method, settings.light_paths, settings.blockers,
+                      settings.field_resolution)), native_render(self, settings, view))[1])
+    single = render()[..., :3].sum()
+    scene.brume.method = 'LPV'
+    found = {}
+    for paths in native.LIGHT_PATHS:
+        scene.brume.light_paths = paths
+        found[paths] = render(paths)[..., :3].sum()
+    scene.brume.light_paths, scene.brume.blockers = 'ALL', 'FUZZY'
+    render("fuzzy")
+    assert asked == [(0, 0, 0, 8), *((1, number, 0, 8) for number in range(6)), (1, 0, 1, 8)]
+    assert found["ALL"] > 1.02 * single
+    np.testing.assert_allclose(found["SINGLE"], single, rtol=1e-3)
+    assert found["DIRECT"] < found["SINGLE"] <= found["SUM"] <= found["ALL"]
+
+
+def test_panels_are_those_of_the_method(scene):
+    panels = [bpy.types.BRUME_PT_light_propagation, bpy.types.BRUME_PT_light_propagation_comparison]
+    scene.render.engine = 'BRUME'
+    for method, shown in (('OPV', False), ('LPV', True)):
+        scene.brume.method = method
+        assert [panel.poll(bpy.context) for panel in panels] == [shown, shown]
+
+
 def test_zero_scale_leaves_the_rest(scene, render, reported):
     lit(scene)
     whole = render()
@@ -142,13 +173,14 @@ def test_passes_reach_the_file(scene, tmp_path):
     layer.use_pass_z = layer.use_pass_normal = True
     layer.use_pass_emit = layer.use_pass_environment = True
     layer.brume.use_pass_volume_direct = layer.brume.use_pass_transmittance = True
+    layer.brume.use_pass_volume_indirect = True
     blenders.multilayer(scene.render.image_settings)
     scene.render.filepath = str(tmp_path / "layers.exr")
     bpy.ops.render.render(write_still=True)
     names = header_channels(tmp_path / "layers.exr")
     wanted = {f"ViewLayer.{name}.{c}" for name, channels in (
         ("Combined", "RGBA"), ("Depth", "Z"), ("Normal", "XYZ"), ("Emit", "RGB"), ("Env", "RGB"),
-        ("VolumeDir", "RGB"), ("Transmittance", "RGB")) for c in channels}
+        ("VolumeDir", "RGB"), ("VolumeInd", "RGB"), ("Transmittance", "RGB")) for c in channels}
     assert wanted == {name for name in names if name.startswith("ViewLayer.")}
 
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* LPV: that light in flight keeps its power, goes alike in all directions and adds up; that a turned
- * scene is a turned picture; that a white furnace is white; and that nothing becomes negative or
- * infinite whatever the scene is. */
+/* LPV: that light in flight keeps its power, goes alike in all directions and adds up; that a
+ * turned scene is a turned picture; that a white furnace is white; and that nothing becomes
+ * negative or infinite whatever the scene is. */
 #include "gl/device.h"
 #include "harness.h"
 #include "render/job.h"
@@ -73,8 +73,8 @@ static const float *texel(const struct field *field, const int cell[3], int colo
 {
     const size_t x = (size_t)(cell[0] + color * field->dims[0]);
     return field->texels +
-           4 * (x + (size_t)field->width *
-                        ((size_t)cell[1] + (size_t)field->height * (size_t)cell[2]));
+           4 * (x +
+                (size_t)field->width * ((size_t)cell[1] + (size_t)field->height * (size_t)cell[2]));
 }
 
 static double fluence(const struct field *field, const int cell[3], int color)
@@ -120,10 +120,16 @@ static void add_box(brume_scene *scene, uint64_t key, float half, float reflecta
     float positions[24];
     uint32_t triangles[36];
     cube_mesh(origin, half, positions, triangles);
-    const brume_mesh mesh = {.name = "box", .positions = positions, .triangles = triangles,
-                             .materials = &key, .vertex_count = 8, .triangle_count = 12,
+    const brume_mesh mesh = {.name = "box",
+                             .positions = positions,
+                             .triangles = triangles,
+                             .materials = &key,
+                             .vertex_count = 8,
+                             .triangle_count = 12,
                              .material_count = 1};
-    const brume_instances instances = {.world_from_object = identity, .mesh = key, .count = 1,
+    const brume_instances instances = {.world_from_object = identity,
+                                       .mesh = key,
+                                       .count = 1,
                                        .visibility = BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW};
     assert_ok(brume_scene_set_material(scene, key, &material));
     assert_ok(brume_scene_set_mesh(scene, key, &mesh));
@@ -132,8 +138,8 @@ static void add_box(brume_scene *scene, uint64_t key, float half, float reflecta
 
 /* --- Power ---------------------------------------------------------------------------------- */
 
-/* In a white box with a white medium all of a lamp's light is scattered or reflected once, 1 W of each
- * colour, and then flies for ever. */
+/* In a white box with a white medium all of a lamp's light is scattered or reflected once, 1 W of
+ * each colour, and then flies for ever. */
 static void power_is_kept(void **state)
 {
     (void)state;
@@ -156,16 +162,32 @@ static void power_is_kept(void **state)
     brume_scene_destroy(scene);
 }
 
-/* A grain of medium that a lamp lights: a source in one cell, alike in all directions, amid a medium
- * that absorbs. */
+/* A grain of medium that a lamp lights: a source in one cell, alike in all directions, amid a
+ * medium that absorbs. */
 static void all_directions_are_alike(void **state)
 {
     (void)state;
     static const int ways[3][12][3] = {
         {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
-        {{1, 1, 0}, {-1, 1, 0}, {1, -1, 0}, {-1, -1, 0}, {1, 0, 1}, {-1, 0, 1}, {1, 0, -1},
-         {-1, 0, -1}, {0, 1, 1}, {0, -1, 1}, {0, 1, -1}, {0, -1, -1}},
-        {{1, 1, 1}, {-1, 1, 1}, {1, -1, 1}, {-1, -1, 1}, {1, 1, -1}, {-1, 1, -1}, {1, -1, -1},
+        {{1, 1, 0},
+         {-1, 1, 0},
+         {1, -1, 0},
+         {-1, -1, 0},
+         {1, 0, 1},
+         {-1, 0, 1},
+         {1, 0, -1},
+         {-1, 0, -1},
+         {0, 1, 1},
+         {0, -1, 1},
+         {0, 1, -1},
+         {0, -1, -1}},
+        {{1, 1, 1},
+         {-1, 1, 1},
+         {1, -1, 1},
+         {-1, -1, 1},
+         {1, 1, -1},
+         {-1, 1, -1},
+         {1, -1, -1},
          {-1, -1, -1}}};
     static const int counts[3] = {6, 12, 8};
     static const struct coefficients black = {.sigma_a = {0.0f, 1.0f, 10.0f}};
@@ -297,7 +319,9 @@ static struct field turned(float degrees, int iterations)
     assert_ok(brume_scene_set_volume(scene, 1, &cube.volume));
     add_cube(scene, 2, (float[3]){0.1f, -0.3f, 0.0f}, 0.2f,
              BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW);
-    const brume_instances instances = {.world_from_object = matrix, .mesh = 2, .count = 1,
+    const brume_instances instances = {.world_from_object = matrix,
+                                       .mesh = 2,
+                                       .count = 1,
                                        .visibility = BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW};
     assert_ok(brume_scene_set_instances(scene, 2, &instances));
     for (int i = 0; i < 2; ++i) {
@@ -384,8 +408,8 @@ static void a_turn_changes_little(void **state)
 
 /* --- Furnaces ------------------------------------------------------------------------------- */
 
-/* What scatters all light cannot be seen in an even world. In thick media the sky's nodes are coarse at
- * the rim; of strong forward lobes two bands know the mean alone. */
+/* What scatters all light cannot be seen in an even world. In thick media the sky's nodes are
+ * coarse at the rim; of strong forward lobes two bands know the mean alone. */
 static void white_furnace(void **state)
 {
     (void)state;
@@ -438,7 +462,8 @@ static void thick_cells(void **state)
 {
     (void)state;
     static const struct coefficients media[] = {
-        {.sigma_s = {800, 400, 8}}, {.sigma_a = {800, 400, 8}},
+        {.sigma_s = {800, 400, 8}},
+        {.sigma_a = {800, 400, 8}},
         {.sigma_s = {790, 0, 60000}, .sigma_a = {10, 800, 60000}, .g = 0.9f}};
     for (size_t i = 0; i < 3; ++i) { /* 800/m: 50 a cell */
         brume_scene *scene = empty();
@@ -522,18 +547,12 @@ static void many_iterations(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(power_is_kept),
-        cmocka_unit_test(all_directions_are_alike),
-        cmocka_unit_test(light_adds_up),
-        cmocka_unit_test(early_is_as_late),
-        cmocka_unit_test(a_quarter_turn_is_exact),
-        cmocka_unit_test(a_turn_changes_little),
-        cmocka_unit_test(white_furnace),
-        cmocka_unit_test(thick_cells),
-        cmocka_unit_test(lamps_in_walls),
-        cmocka_unit_test(small_rooms),
-        cmocka_unit_test(nothing_scatters),
-        cmocka_unit_test(many_iterations),
+        cmocka_unit_test(power_is_kept),           cmocka_unit_test(all_directions_are_alike),
+        cmocka_unit_test(light_adds_up),           cmocka_unit_test(early_is_as_late),
+        cmocka_unit_test(a_quarter_turn_is_exact), cmocka_unit_test(a_turn_changes_little),
+        cmocka_unit_test(white_furnace),           cmocka_unit_test(thick_cells),
+        cmocka_unit_test(lamps_in_walls),          cmocka_unit_test(small_rooms),
+        cmocka_unit_test(nothing_scatters),        cmocka_unit_test(many_iterations),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

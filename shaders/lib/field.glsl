@@ -15,16 +15,15 @@ bool field_exists()
     return frame.field_dims.w != 0;
 }
 
+// Numbers of links by their offsets, x first; 31: there is none to the cell itself.
+const uint NUMBERS[27] = uint[](
+    22u, 20u, 12u, 18u, 15u, 6u, 24u, 8u, 10u, 16u, 14u, 4u, 13u, 31u,
+    0u, 17u, 1u, 3u, 23u, 21u, 11u, 19u, 2u, 5u, 25u, 7u, 9u);
+
 // Whether a surface cuts the link from a cell with those cut links, by the offset to its neighbour.
-bool is_cut(vec2 cuts, ivec3 offset)
+bool is_cut(uint cuts, ivec3 offset)
 {
-    for (int i = 0; i < 13; ++i) {
-        if (LINKS[i] == offset)
-            return (uint(cuts.x) >> i & 1u) != 0u;
-        if (LINKS[i] == -offset)
-            return (uint(cuts.y) >> i & 1u) != 0u;
-    }
-    return false;
+    return (cuts >> NUMBERS[9 * offset.z + 3 * offset.y + offset.x + 13] & 1u) != 0u;
 }
 
 ivec3 of_cell(ivec3 cell)
@@ -50,7 +49,8 @@ ivec3 home_of(ivec3 low, vec3 f, ivec3 last)
 }
 
 // Interpolated between the eight cells around a point, but for those that a surface parts from the
-// cell that it belongs to, and those not before the plane (xyz: normal, w: the product with its points).
+// cell that it belongs to, and those not before the plane (xyz: normal, w: its points' product with
+// that).
 field_light field_between(vec3 p, vec4 plane)
 {
     vec3 at = (p - frame.field_lower.xyz) / frame.field_lower.w - 0.5;
@@ -58,12 +58,14 @@ field_light field_between(vec3 p, vec4 plane)
     ivec3 low = ivec3(floor(at));
     vec3 f = at - vec3(low);
     ivec3 home = home_of(low, f, last);
-    vec2 cuts = texelFetch(field_lattice, of_cell(home), 0).xy;
+    vec2 sides = texelFetch(field_lattice, of_cell(home), 0).xy;
+    uint cuts = uint(sides.x) | uint(sides.y) << 13;
     // A cell that nearly all links to are cut is within something small, and tells nothing.
-    bool within = bitCount(uint(cuts.x)) + bitCount(uint(cuts.y)) > 17;
+    bool within = bitCount(cuts) > 17;
     field_light light = field_light(vec3(0.0), mat3(0.0));
     float sum = 0.0;
-    for (int corner = 0; corner < 8; ++corner) {
+    int corners = 8 * frame.field_dims.w; // not unrolled, which would take seconds to compile
+    for (int corner = 0; corner < corners; ++corner) {
         ivec3 side = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
         ivec3 cell = clamp(low + side, ivec3(0), last);
         vec3 each = mix(1.0 - f, f, vec3(side));

@@ -255,13 +255,16 @@ media_spans spans_of(view_ray ray, float t_near, float t_far)
 void march_media(inout march_state state, view_ray ray, media_spans spans, ivec2 pixel)
 {
     float jitter = pixel_random(pixel, 11u);
-    int fog_steps = int(frame.march.y);
-    vec2 box = spans.box;
-    if (spans.before.x < spans.before.y)
-        march(state, ray, spans.before, fog_steps, false, pixel, jitter);
-    if (box.x < box.y)
-        march(state, ray, box, max(int(ceil((box.y - box.x) / frame.march.x)), 1), true, pixel,
-              jitter);
-    if (spans.after.x < spans.after.y)
-        march(state, ray, spans.after, fog_steps, false, pixel, jitter);
+    vec2 stretches[3] = vec2[](spans.before, spans.box, spans.after);
+    // One call, in a loop that no compiler unrolls: three would be three times as long to compile.
+    int last = 2 + min(int(frame.march.y), 0);
+    for (int i = 0; i <= last; ++i) {
+        vec2 span = stretches[i];
+        if (span.x >= span.y)
+            continue;
+        bool in_box = i == 1;
+        int count = in_box ? max(int(ceil((span.y - span.x) / frame.march.x)), 1)
+                           : int(frame.march.y);
+        march(state, ray, span, count, in_box, pixel, jitter);
+    }
 }

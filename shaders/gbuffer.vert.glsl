@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The camera's view of the surfaces, one vertex.
 #version 450 core
-#include "lib/vertex.glsl"
-
-out vec3 world_position;
-out vec3 world_normal;
+#include "lib/surface.glsl"
 
 void main()
 {
-    gpu_instance instance = instances[in_instance];
-    vec4 p = instance.world_from_object * vec4(in_position, 1.0);
-    world_position = p.xyz;
-    world_normal = mat3(instance.normal_from_object) * in_normal;
-    place_corner(p, VISIBLE_CAMERA);
+    place_surface(VISIBLE_CAMERA);
 }

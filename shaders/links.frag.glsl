@@ -30,15 +30,11 @@ void main()
 {
     gpu_material material = materials[material_number];
     vec4 base = material_base(material, uv);
-    float alpha = material_shadow_alpha(material, material_alpha(material, base));
-    if (!material_covers(material, alpha, gl_FragCoord.xy, instance_number, stage.info.x))
+    if (!material_casts(material, base, gl_FragCoord.xy, instance_number, stage.info.x))
         discard;
     ivec3 link = LINKS[stage.info.y];
     int axis = link.x != 0 ? 0 : (link.y != 0 ? 1 : 2);
-    // A little aside, as the picture is: what lies exactly at cells' centres is on one side of them
-    // for all links.
-    vec3 at = (world_position - frame.field_lower.xyz) / frame.field_lower.w - 0.5 +
-              vec3(1.3e-4, 1.7e-4, 2.1e-4);
+    vec3 at = (world_position - frame.field_lower.xyz) / frame.field_lower.w - 0.5 + ASIDE;
     float along = floor(at[axis]);
     ivec3 cell = ivec3(round(at - (at[axis] - along) * vec3(link)));
     cell[axis] = int(along);

@@ -50,9 +50,7 @@ void main()
     normal *= sign(cosine); // both sides of a surface are the same
     float side = frame.field_lower.w;
     area /= abs(cosine) * side * side;
-    // A little aside, as links are.
-    ivec3 cell = ivec3(floor((p - frame.field_lower.xyz) / side + 0.5 +
-                             vec3(1.3e-4, 1.7e-4, 2.1e-4)));
+    ivec3 cell = ivec3(floor((p - frame.field_lower.xyz) / side + 0.5 + ASIDE));
     if (!in_blockers(cell))
         return;
     vec3 squares = normal * normal;

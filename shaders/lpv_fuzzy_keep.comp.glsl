@@ -19,8 +19,7 @@ void main()
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
     if (!in_blockers(cell) || cell.z >= stage.slab.w)
         return;
-    ivec2 tile = ivec2(cell.z % stage.offset.x, cell.z / stage.offset.x);
-    ivec2 texel = tile * blockers_dims().xy + cell.xy;
+    ivec2 texel = tiled_texel(cell, blockers_dims(), stage.offset.x);
     for (int i = 0; i < 2; ++i) {
         vec4 sum = texelFetch(sums[i], texel, 0);
         // What stands one behind another in a cell blocks its face once.

@@ -33,8 +33,7 @@ void main()
         for (int i = 0; i < SAMPLES * SAMPLES * SAMPLES; ++i) {
             vec3 p = lower + (vec3(i % SAMPLES, i / SAMPLES % SAMPLES, i / (SAMPLES * SAMPLES)) + 0.5) *
                                  (side / float(SAMPLES));
-            if (any(lessThan(p, frame.medium_lower.xyz)) ||
-                any(greaterThan(p, frame.medium_upper.xyz)))
+            if (!in_box(p, frame.medium_lower.xyz, frame.medium_upper.xyz))
                 continue;
             vec3 uvw = medium_coordinate(p);
             vec4 s = textureLod(medium_scatter, uvw, 0.0);

@@ -25,10 +25,8 @@ vec3 texel_power(vec3 p, out vec3 towards)
     float area = stage.scale.x * stage.scale.x;
     if (stage.what.x < 0) {
         towards = s.position.xyz;
-        vec3 tau = fog_tau(p, towards, 1e30);
-        if (medium_exists())
-            tau += medium_tau(p, towards, 1e30, 2.0 * frame.medium_lower.w, 0.5);
-        return s.weight.rgb * exp(-tau) * area;
+        return s.weight.rgb * area *
+               distant_transmittance(p, towards, 2.0 * frame.medium_lower.w, 0.5);
     }
     gpu_light light = lights[stage.what.x];
     float square;

@@ -37,19 +37,13 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
     float volume = part * part * part;
     vec3 sigma_s = vec3(0.0);
     float g = 0.0;
-    bool fog = fog_exists() && all(greaterThanEqual(p, frame.fog_lower.xyz)) &&
-               all(lessThanEqual(p, frame.fog_upper.xyz));
-    if (medium_exists() && all(greaterThanEqual(p, frame.medium_lower.xyz)) &&
-        all(lessThanEqual(p, frame.medium_upper.xyz))) {
+    if (medium_exists() && in_box(p, frame.medium_lower.xyz, frame.medium_upper.xyz)) {
         vec4 scatter = textureLod(medium_scatter, medium_coordinate(p), 0.0);
         sigma_s = scatter.rgb;
         g = scatter.a;
     }
-    if (fog) {
-        float here = luminance(sigma_s), there = luminance(frame.fog_sigma_s.rgb);
-        g = (here * g + there * frame.fog_sigma_s.w) / max(here + there, 1e-30);
-        sigma_s += frame.fog_sigma_s.rgb;
-    }
+    if (fog_exists() && in_box(p, frame.fog_lower.xyz, frame.fog_upper.xyz))
+        add_fog(sigma_s, g);
     if (sigma_s == vec3(0.0))
         return;
     for (uint i = 0u; i < frame.counts.x; ++i) {
@@ -84,8 +78,7 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
 float begin(ivec3 cell)
 {
     float side = frame.field_lower.w;
-    ivec2 tile = ivec2(cell.z % stage.offset.y, cell.z / stage.offset.y);
-    ivec2 texel = tile * frame.field_dims.xy + cell.xy;
+    ivec2 texel = tiled_texel(cell, frame.field_dims.xyz, stage.offset.y);
     vec4 flow[3];
     for (int c = 0; c < 3; ++c)
         flow[c] = texelFetch(reflected[c], texel, 0);

@@ -34,10 +34,8 @@ void main()
         int number = int(s.position.w);
         if (number >= 0 && distant_shadow_medium(number, frame.world.w, p) == 0.0)
             continue;
-        vec3 tau = fog_tau(p, towards, 1e30);
-        if (medium_exists())
-            tau += medium_tau(p, towards, 1e30, step_length, 0.5);
-        vec3 light = s.weight.rgb * exp(-tau) * float(every);
+        vec3 light = s.weight.rgb * distant_transmittance(p, towards, step_length, 0.5) *
+                     float(every);
         // Y_0 = sqrt(1 / 4 pi), Y_1 = sqrt(3 / 4 pi) (y, z, x); kept as mean and flux vector:
         // the constants are put back in sky_scatter().
         vec4 basis = vec4(1.0, -towards);

@@ -18,8 +18,7 @@ void main()
 {
     gpu_material material = materials[material_number];
     vec4 base = material_base(material, uv);
-    float alpha = material_shadow_alpha(material, material_alpha(material, base));
-    if (!material_covers(material, alpha, gl_FragCoord.xy, instance_number, stage.info.x))
+    if (!material_casts(material, base, gl_FragCoord.xy, instance_number, stage.info.x))
         discard;
     out_position = vec4(world_position, 1.0);
     out_normal = vec4(world_normal * inversesqrt(max(dot(world_normal, world_normal), 1e-30)), 0.0);

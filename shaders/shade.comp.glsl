@@ -43,10 +43,7 @@ vec3 light_surface(surface s, vec3 p, gpu_light light, ivec2 pixel, uint number)
 // that they leave no pattern.
 vec3 world_transmittance(vec3 p, vec3 towards, float within)
 {
-    vec3 tau = fog_tau(p, towards, 1e30);
-    if (medium_exists())
-        tau += medium_tau(p, towards, 1e30, 4.0 * frame.medium_lower.w, within);
-    return exp(-tau);
+    return distant_transmittance(p, towards, 4.0 * frame.medium_lower.w, within);
 }
 
 float world_shadow(gpu_light_sample w, vec3 p, vec3 normal)

@@ -10,8 +10,7 @@ flat in uint instance_number;
 void main()
 {
     gpu_material material = materials[material_number];
-    float alpha =
-        material_shadow_alpha(material, material_alpha(material, material_base(material, uv)));
-    if (!material_covers(material, alpha, gl_FragCoord.xy, instance_number, stage.info.x))
+    vec4 base = material_base(material, uv);
+    if (!material_casts(material, base, gl_FragCoord.xy, instance_number, stage.info.x))
         discard;
 }

@@ -16,8 +16,7 @@ static const int links[LINKS][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 0
 /* The view along a link: an affine map, sheared. `size`: its pixels. */
 static mat4 view_along(const struct gpu_frame *frame, const int link[3], int size[2])
 {
-    /* As links.frag.glsl: a little aside, lest a surface lie at cells' centres. */
-    static const double aside[3] = {1.3e-4, 1.7e-4, 2.1e-4};
+    static const double aside[3] = {(double)ASIDE_X, (double)ASIDE_Y, (double)ASIDE_Z};
     const float *lower = &frame->field_lower.x;
     const int *dims = &frame->field_dims.x;
     const double per_m = 1.0 / (double)frame->field_lower.w;

@@ -48,6 +48,15 @@ ivec3 home_of(ivec3 low, vec3 f, ivec3 last)
     return clamp(home, ivec3(0), last);
 }
 
+void add_cell(inout field_light light, ivec3 cell, float weight)
+{
+    for (int c = 0; c < 3; ++c) {
+        vec4 texel = texelFetch(field_lattice, cell + ivec3(c * frame.field_dims.x, 0, 0), 0);
+        light.fluence[c] += weight * texel.x;
+        light.flux[c] += weight * texel.yzw;
+    }
+}
+
 // Interpolated between the eight cells around a point, but for those that a surface parts from the
 // cell that it belongs to, and those not before the plane (xyz: normal, w: its points' product with
 // that).
@@ -74,22 +83,15 @@ field_light field_between(vec3 p, vec4 plane)
             dot(cell_centre(cell), plane.xyz) < plane.w)
             continue;
         sum += weight;
-        for (int c = 0; c < 3; ++c) {
-            vec4 texel = texelFetch(field_lattice, cell + ivec3(c * frame.field_dims.x, 0, 0), 0);
-            light.fluence[c] += weight * texel.x;
-            light.flux[c] += weight * texel.yzw;
-        }
+        add_cell(light, cell, weight);
     }
     if (sum > 1e-3) {
         light.fluence /= sum;
         light.flux /= sum;
         return light;
     }
-    for (int c = 0; c < 3; ++c) {
-        vec4 texel = texelFetch(field_lattice, home + ivec3(c * frame.field_dims.x, 0, 0), 0);
-        light.fluence[c] = texel.x;
-        light.flux[c] = texel.yzw;
-    }
+    light = field_light(vec3(0.0), mat3(0.0));
+    add_cell(light, home, 1.0);
     return light;
 }
 

@@ -54,6 +54,11 @@ vec2 ray_box(vec3 origin, vec3 direction, vec3 lower, vec3 upper)
     return vec2(max(max(near.x, near.y), near.z), min(min(far.x, far.y), far.z));
 }
 
+bool in_box(vec3 p, vec3 lower, vec3 upper)
+{
+    return all(greaterThanEqual(p, lower)) && all(lessThanEqual(p, upper));
+}
+
 float luminance(vec3 rgb)
 {
     return dot(rgb, vec3(0.2126, 0.7152, 0.0722));

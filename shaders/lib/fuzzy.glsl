@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The fuzzy blockers' lattice: half a cell lower than the field's, a cell more along every side.
-#include "lib/frame.glsl"
+#include "lib/links.glsl"
 
 ivec3 blockers_dims()
 {

@@ -8,6 +8,8 @@ const ivec3 LINKS[13] =
             ivec3(1, 0, 1), ivec3(1, 0, -1), ivec3(0, 1, 1), ivec3(0, 1, -1), ivec3(1, 1, 1),
             ivec3(1, 1, -1), ivec3(1, -1, 1), ivec3(1, -1, -1));
 
+const vec3 ASIDE = vec3(ASIDE_X, ASIDE_Y, ASIDE_Z);
+
 // Shares of a uniform emission: the weights of the quadrature with these 26 points that is exact for
 // polynomials of degree 7 (Lebedev, "Quadratures on a sphere", 1976), so that a lobe sends out the power
 // and the flux that it has.
@@ -30,9 +32,15 @@ vec3 cell_centre(ivec3 cell)
 }
 
 // Where a cell stands in a picture of a lattice with its layers as tiles, so many in a row.
+ivec2 tiled_texel(ivec3 cell, ivec3 dims, int row)
+{
+    return ivec2(cell.z % row, cell.z / row) * dims.xy + cell.xy;
+}
+
+// The same in clip space.
 vec4 tiled_position(ivec3 cell, ivec3 dims, int row)
 {
-    vec2 place = vec2(ivec2(cell.z % row, cell.z / row) * dims.xy + cell.xy) + 0.5;
+    vec2 place = vec2(tiled_texel(cell, dims, row)) + 0.5;
     return vec4(place / vec2(dims.xy * ivec2(row, (dims.z + row - 1) / row)) * 2.0 - 1.0, 0.5, 1.0);
 }
 

@@ -95,9 +95,7 @@ bool look_up(view_ray ray, float t, float dt, float within, bool in_lattice, boo
         }
     }
     if (fog) {
-        float here = luminance(m.sigma_s), there = luminance(frame.fog_sigma_s.rgb);
-        m.g = (here * m.g + there * frame.fog_sigma_s.w) / max(here + there, 1e-30);
-        m.sigma_s += frame.fog_sigma_s.rgb;
+        add_fog(m.sigma_s, m.g);
         m.sigma_t += frame.fog_sigma_t.rgb;
         m.emission += frame.fog_emission.rgb;
     }

@@ -48,3 +48,10 @@ bool material_covers(gpu_material material, float alpha, vec2 pixel, uint surfac
     float lot = fract(float(start) * (1.0 / 4294967296.0) + float(seed) * 0.6710436067);
     return lot < alpha;
 }
+
+// The same for a light's rays, that know no colour.
+bool material_casts(gpu_material material, vec4 base, vec2 pixel, uint surface, uint seed)
+{
+    float alpha = material_shadow_alpha(material, material_alpha(material, base));
+    return material_covers(material, alpha, pixel, surface, seed);
+}

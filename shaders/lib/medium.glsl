@@ -66,6 +66,14 @@ bool fog_exists()
     return frame.fog_lower.w != 0.0;
 }
 
+// Adds the world's medium to what scatters; g: the mean, weighted by how much each scatters.
+void add_fog(inout vec3 sigma_s, inout float g)
+{
+    float here = luminance(sigma_s), there = luminance(frame.fog_sigma_s.rgb);
+    g = (here * g + there * frame.fog_sigma_s.w) / max(here + there, 1e-30);
+    sigma_s += frame.fog_sigma_s.rgb;
+}
+
 // Optical depth of the world's medium from the origin along a unit direction.
 vec3 fog_tau(vec3 origin, vec3 direction, float t_max)
 {
@@ -74,4 +82,13 @@ vec3 fog_tau(vec3 origin, vec3 direction, float t_max)
     vec2 span = ray_box(origin, direction, frame.fog_lower.xyz, frame.fog_upper.xyz);
     float length_inside = max(min(span.y, t_max) - max(span.x, 0.0), 0.0);
     return frame.fog_sigma_t.rgb * length_inside;
+}
+
+// What all media between a point and something infinitely far let through; as medium_tau.
+vec3 distant_transmittance(vec3 p, vec3 towards, float step_length, float within)
+{
+    vec3 tau = fog_tau(p, towards, 1e30);
+    if (medium_exists())
+        tau += medium_tau(p, towards, 1e30, step_length, within);
+    return exp(-tau);
 }

@@ -93,6 +93,12 @@ typedef struct mat4 { float m[16]; } mat4;
 #define HALF_ROWS(rows, height)                                                                    \
     ((rows) == 0 ? 0 : (rows) / 2 + 1 < ((height) + 1) / 2 ? (rows) / 2 + 1 : ((height) + 1) / 2)
 
+/* Surfaces are seen this much aside, in cells: what lies exactly at cells' centres is then on one side
+ * of them for all links. */
+#define ASIDE_X 1.3e-4f
+#define ASIDE_Y 1.7e-4f
+#define ASIDE_Z 2.1e-4f
+
 /* Texels of a cell in the picture of its surfaces: sums of their reflectances and a count, and for the
  * links along the three axes how far along the last cut is, in 1/254, from 1; 0: there is none. */
 #define WALL_TEXELS 7

@@ -470,11 +470,8 @@ typedef struct brume_settings {
     uint32_t depths;                 /* brume_depths */
     uint32_t light_paths;            /* brume_light_paths */
     uint32_t blockers;               /* brume_blockers */
-    uint32_t cascades;               /* LPV: lattices one within another, each with cells half as
-                                        large as the one around it; 0: 1, at most 3 */
     int32_t field_resolution;        /* cells along the longest side of the lattice in which scattered
                                         and reflected light goes on; 0: half of lattice_resolution */
-    uint32_t reserved;
     uint64_t memory_budget;          /* bytes on the GPU; 0: 2 GiB */
 } brume_settings;
 

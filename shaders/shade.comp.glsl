@@ -155,7 +155,7 @@ void main()
             float within = pixel_random(pixel, 8u);
             radiance += world_diffuse(s, p, pixel, within) + world_specular(s, p, pixel, within);
         }
-        if (field_exists() && frame.paths.z != 0)
+        if (field_exists())
             radiance += field_surface(s, p);
     }
     imageStore(surface_image, pixel, vec4(radiance, 0.0));

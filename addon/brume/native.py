@@ -159,8 +159,8 @@ class Settings(Structure):
                 ("lattice_resolution", c_int32), ("iterations", c_int32),
                 ("shadow_resolution", c_int32), ("light_samples", c_int32),
                 ("world_samples", c_int32), ("step", c_float), ("depths", c_uint32),
-                ("light_paths", c_uint32), ("blockers", c_uint32), ("cascades", c_uint32),
-                ("field_resolution", c_int32), ("reserved", c_uint32), ("memory_budget", c_uint64)]
+                ("light_paths", c_uint32), ("blockers", c_uint32), ("field_resolution", c_int32),
+                ("memory_budget", c_uint64)]
 
 
 class View(Structure):

@@ -27,8 +27,6 @@ static brume_result check_settings(brume_settings *settings)
     set_default(&settings->shadow_resolution, 512);
     set_default(&settings->light_samples, 8);
     set_default(&settings->world_samples, 128);
-    if (settings->cascades == 0)
-        settings->cascades = 1;
     if (settings->step == 0.0f)
         settings->step = 1.0f;
     if (settings->memory_budget == 0)
@@ -43,7 +41,6 @@ static brume_result check_settings(brume_settings *settings)
     REQUIRE(settings->depths < BRUME_DEPTHS_COUNT);
     REQUIRE(settings->light_paths < BRUME_PATHS_COUNT);
     REQUIRE(settings->blockers < BRUME_BLOCKERS_COUNT);
-    REQUIRE(settings->cascades >= 1 && settings->cascades <= 3);
     REQUIRE(settings->iterations >= 0);
     REQUIRE(settings->step >= 0.05f && settings->step <= 100.0f);
     REQUIRE(settings->memory_budget >= 1 << 20);

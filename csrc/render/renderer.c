@@ -171,7 +171,6 @@ static void set_paths(struct run *run)
     run->renderer->frame.paths = (ivec4){
         .x = all || sum || paths == BRUME_PATHS_SINGLE,
         .y = all || sum || paths == BRUME_PATHS_REFLECTED_MARCHED,
-        .z = paths != BRUME_PATHS_DIRECT && paths != BRUME_PATHS_SINGLE,
     };
 }
 
@@ -226,6 +225,8 @@ static brume_result work_transport(struct run *run)
         .stats = &request->stats,
         .tau_size = {renderer->tau_size[0], renderer->tau_size[1], renderer->tau_size[2]},
     };
+    if (!renderer->frame.field_dims.w) /* left by another method, or by other paths */
+        texture_finish(&run->gpu->memory, &renderer->transport.field);
     return method->run(&renderer->transport, &input);
 }
 
@@ -513,9 +514,8 @@ static brume_result run_stages(struct run *run)
                                   lattice_wants_field(settings),
                                   settings->light_paths == BRUME_PATHS_ALL,
                                   settings->blockers,
-                                  settings->cascades,
                                   float_bits(snapshot->world.reach)};
-    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 15, work_transport));
+    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 14, work_transport));
     collect_warnings(run);
     return BRUME_OK;
 }

@@ -40,7 +40,7 @@ static brume_result make(struct lpv_work *work)
     const ivec4 dims = work->input->frame->field_dims;
     static const char *const labels[] = {"cells' extinction", "cells' albedo", "cells' surfaces"};
     work->tiles = (int)ceil(sqrt((double)dims.z));
-    const int rows = (dims.z + work->tiles - 1) / work->tiles;
+    const int rows = lpv_tile_rows(&dims, work->tiles);
     for (int c = 0; c < 3; ++c) {
         TRY(lattice_texture(work, &work->flow[0][c], GL_RGBA32F, 1, "light in flight"));
         TRY(lattice_texture(work, &work->flow[1][c], GL_RGBA32F, 1, "light in flight"));
@@ -88,20 +88,31 @@ static void bind_textures(int slot, const struct texture textures[3])
         glBindTextureUnit((GLuint)(slot + c), textures[c].id);
 }
 
-static brume_result over_lattice(struct lpv_work *work, const char *stem, ivec4 offset)
+brume_result lpv_over_lattice(struct lpv_work *work, const char *stem, ivec4 offset,
+                              const ivec4 *dims)
 {
-    const struct transport_input *input = work->input;
     const struct program *program;
-    TRY(program_compute(&input->gpu->programs, stem, &program));
-    return opv_slabs(&work->passes, program, (struct gpu_lattice_pass){.offset = offset},
-                     &input->frame->field_dims, 0.0f, 0.0f);
+    TRY(program_compute(&work->input->gpu->programs, stem, &program));
+    return opv_slabs(&work->passes, program, (struct gpu_lattice_pass){.offset = offset}, dims,
+                     0.0f, 0.0f);
+}
+
+static brume_result over_field(struct lpv_work *work, const char *stem, ivec4 offset)
+{
+    return lpv_over_lattice(work, stem, offset, &work->input->frame->field_dims);
+}
+
+/* Otherwise the lattice knows surfaces alone. */
+static int with_media(const struct lpv_work *work)
+{
+    return work->input->settings->light_paths == BRUME_PATHS_ALL;
 }
 
 static brume_result fill_cells(struct lpv_work *work)
 {
     glBindTextureUnit(SLOT_WALLS, work->walls.id);
     bind_images(SLOT_OUTPUT, work->cells, GL_WRITE_ONLY, GL_RGBA16F);
-    TRY(over_lattice(work, "lpv_medium", (ivec4){work->media, 0, 0, 0}));
+    TRY(over_field(work, "lpv_medium", (ivec4){with_media(work), 0, 0, 0}));
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     return BRUME_OK;
 }
@@ -127,7 +138,7 @@ static brume_result begin(struct lpv_work *work)
     static const float nothing[4];
     bind_textures(SLOT_REFLECTED, work->reflected);
     bind_images(SLOT_OUTPUT, work->flow[0], GL_WRITE_ONLY, GL_RGBA32F);
-    TRY(over_lattice(work, "lpv_scatter", (ivec4){work->media, work->tiles, 0, 0}));
+    TRY(over_field(work, "lpv_scatter", (ivec4){with_media(work), work->tiles, 0, 0}));
     TRY(in_flight(work, &work->input->stats->power_begun));
     for (int c = 0; c < 3; ++c)
         glClearTexImage(work->sums[c].id, 0, GL_RGBA, GL_FLOAT, nothing);
@@ -174,7 +185,7 @@ static brume_result iterate(struct lpv_work *work, int number, bool look, double
     work->passes.done = 1.0f + 0.5f * (float)number / (float)all;
     bind_textures(SLOT_FLOW, work->flow[number % 2]);
     bind_images(SLOT_OUTPUT, work->flow[(number + 1) % 2], GL_WRITE_ONLY, GL_RGBA32F);
-    TRY(over_lattice(work, lpv_is_fuzzy(work) ? "lpv_propagate_fuzzy" : "lpv_propagate",
+    TRY(over_field(work, lpv_is_fuzzy(work) ? "lpv_propagate_fuzzy" : "lpv_propagate",
                      (ivec4){look, times.bits, 0, 0}));
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     ++work->input->stats->iterations;
@@ -241,14 +252,11 @@ static brume_result find(struct lpv_work *work, struct transport *transport)
 brume_result lpv_run(struct transport *transport, const struct transport_input *input)
 {
     TRY(opv_run(transport, input));
-    if (!input->frame->field_dims.w) {
-        texture_finish(&input->gpu->memory, &transport->field);
+    if (!input->frame->field_dims.w)
         return BRUME_OK;
-    }
     struct lpv_work work = {
         .input = input,
         .passes = {.input = input, .done = 1.0f}, /* after the depths */
-        .media = input->settings->light_paths == BRUME_PATHS_ALL,
     };
     const brume_result result = find(&work, transport);
     finish(&work);

@@ -35,8 +35,16 @@ struct lpv_work {
     int tiles;                      /* of these in a row */
     struct buffer powers;           /* in flight, a group of the last iteration */
     struct lpv_fuzzy fuzzy;         /* nothing, where links block */
-    bool media;                     /* false: the lattice knows surfaces alone */
 };
+
+/* Runs a program over a lattice, in slabs; textures and images are bound. */
+brume_result lpv_over_lattice(struct lpv_work *work, const char *stem, ivec4 offset,
+                              const ivec4 *dims);
+/* The layers of a lattice, tiles of a picture: the rows of these, with so many in each. */
+int lpv_tile_rows(const ivec4 *dims, int in_a_row);
+/* Adds up so many points, the texels of a map, in a picture of a lattice. */
+brume_result lpv_strew(struct lpv_work *work, const char *stem, GLuint target, const ivec4 *dims,
+                       int in_a_row, int texels);
 
 /* Links that surfaces cut, and what these reflect, into work->links and walls. */
 brume_result lpv_cut_links(struct lpv_work *work);

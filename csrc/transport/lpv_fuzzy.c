@@ -33,7 +33,7 @@ brume_result lpv_fuzzy_begin(struct lpv_work *work)
     const ivec4 field = work->input->frame->field_dims;
     const ivec4 dims = {field.x + 1, field.y + 1, field.z + 1,
                         (int)ceil(sqrt((double)field.z + 1.0))};
-    const int rows = (dims.z + dims.w - 1) / dims.w;
+    const int rows = lpv_tile_rows(&dims, dims.w);
     fuzzy->dims = dims;
     for (int i = 0; i < 2; ++i) {
         TRY(texture_init(memory, &fuzzy->sums[i], FOR_TRANSPORT, GL_TEXTURE_2D, GL_RGBA32F,
@@ -70,25 +70,13 @@ void lpv_fuzzy_finish(struct lpv_work *work)
 
 brume_result lpv_fuzzy_add(struct lpv_work *work, int texels)
 {
-    const ivec4 dims = work->fuzzy.dims;
-    const struct program *program;
-    TRY(program_draw(&work->input->gpu->programs, "lpv_fuzzy", &program));
-    glViewport(0, 0, dims.w * dims.x, (dims.z + dims.w - 1) / dims.w * dims.y);
-    glBindFramebuffer(GL_FRAMEBUFFER, work->fuzzy.target);
-    glUseProgram(program->id);
-    glEnable(GL_BLEND);
-    glBlendFunc(GL_ONE, GL_ONE);
-    glDrawArrays(GL_POINTS, 0, texels);
-    glDisable(GL_BLEND);
-    return BRUME_OK;
+    const struct lpv_fuzzy *fuzzy = &work->fuzzy;
+    return lpv_strew(work, "lpv_fuzzy", fuzzy->target, &fuzzy->dims, fuzzy->dims.w, texels);
 }
 
 static brume_result over_lattice(struct lpv_work *work, const char *stem, const ivec4 *dims)
 {
-    const struct gpu_lattice_pass pass = {.offset = {work->fuzzy.dims.w, 0, 0, 0}};
-    const struct program *program;
-    TRY(program_compute(&work->input->gpu->programs, stem, &program));
-    TRY(opv_slabs(&work->passes, program, pass, dims, 0.0f, 0.0f));
+    TRY(lpv_over_lattice(work, stem, (ivec4){work->fuzzy.dims.w, 0, 0, 0}, dims));
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     return BRUME_OK;
 }

@@ -87,22 +87,34 @@ static brume_result draw_map(struct lpv_work *work, struct maps *maps,
     return BRUME_OK;
 }
 
-/* Draws what the light sees, and strews it. */
-static brume_result one_map(struct lpv_work *work, struct maps *maps,
-                            const struct gpu_shadow_view *view, ivec4 what, float scale)
+int lpv_tile_rows(const ivec4 *dims, int in_a_row)
 {
-    const int texels = what.w * what.w;
+    return (dims->z + in_a_row - 1) / in_a_row;
+}
+
+brume_result lpv_strew(struct lpv_work *work, const char *stem, GLuint target, const ivec4 *dims,
+                       int in_a_row, int texels)
+{
     const struct program *program;
-    TRY(draw_map(work, maps, view, what, scale));
-    TRY(program_draw(&work->input->gpu->programs, "lpv_reflect", &program));
-    glBindFramebuffer(GL_FRAMEBUFFER, maps->target);
-    const ivec4 dims = work->input->frame->field_dims;
-    glViewport(0, 0, work->tiles * dims.x, (dims.z + work->tiles - 1) / work->tiles * dims.y);
+    TRY(program_draw(&work->input->gpu->programs, stem, &program));
+    glBindFramebuffer(GL_FRAMEBUFFER, target);
+    glViewport(0, 0, in_a_row * dims->x, lpv_tile_rows(dims, in_a_row) * dims->y);
     glUseProgram(program->id);
     glEnable(GL_BLEND);
     glBlendFunc(GL_ONE, GL_ONE);
     glDrawArrays(GL_POINTS, 0, texels);
     glDisable(GL_BLEND);
+    return BRUME_OK;
+}
+
+/* Draws what the light sees, and strews it. */
+static brume_result one_map(struct lpv_work *work, struct maps *maps,
+                            const struct gpu_shadow_view *view, ivec4 what, float scale)
+{
+    const int texels = what.w * what.w;
+    TRY(draw_map(work, maps, view, what, scale));
+    TRY(lpv_strew(work, "lpv_reflect", maps->target, &work->input->frame->field_dims, work->tiles,
+                  texels));
     return lpv_is_fuzzy(work) ? lpv_fuzzy_add(work, texels) : BRUME_OK;
 }
 

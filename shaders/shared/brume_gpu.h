@@ -246,7 +246,7 @@ struct gpu_frame {
                             samples, in an order of steps of w among them */
     vec4 march;          /* step, m; steps in fog alone; rows of this dispatch: first, end */
     ivec4 paths;         /* 0 leaves out: x: what media scatter of the lights' own light; y: of the
-                            field; z: the field's light on surfaces */
+                            field */
     ivec4 pass_slots[2]; /* slot of each pass in the accumulation buffer, -1: not wanted */
 };
 

@@ -68,6 +68,14 @@ const char *brume_stage_name(uint32_t stage)
     return stage < BRUME_STAGE_COUNT ? names[stage] : "";
 }
 
+const char *brume_field_part_name(uint32_t part)
+{
+    static const char *const names[BRUME_FIELD_PARTS] = {
+        "surfaces", "media", "reflected", "scattered", "blockers",
+        "aggregate", "prepare", "inflow", "iterations", "copy"};
+    return part < BRUME_FIELD_PARTS ? names[part] : "";
+}
+
 static const struct {
     const char *name;
     uint32_t channels;

@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* Raised by every change to a struct, an enumerator or a function below. */
-#define BRUME_ABI 4u
+#define BRUME_ABI 5u
 
 BRUME_API uint32_t brume_abi(void);
 
@@ -458,6 +458,14 @@ typedef enum brume_blockers {
     BRUME_BLOCKERS_COUNT = 2
 } brume_blockers;
 
+/* What the finer of nested lattices surround. */
+typedef enum brume_focus {
+    BRUME_FOCUS_MEDIUM = 0,          /* the middle of the volumes; without any, as 1 */
+    BRUME_FOCUS_CAMERA = 1,          /* what is near the camera, before it: light that goes on is
+                                        found anew as it moves far */
+    BRUME_FOCUS_COUNT = 2
+} brume_focus;
+
 typedef struct brume_settings {
     uint32_t method;
     int32_t medium_resolution;       /* cells along the longest side; 0: 128 */
@@ -472,6 +480,9 @@ typedef struct brume_settings {
     uint32_t blockers;               /* brume_blockers */
     int32_t field_resolution;        /* cells along the longest side of the lattice in which scattered
                                         and reflected light goes on; 0: half of lattice_resolution */
+    int32_t cascades;                /* such lattices, each within the last, of half its length and as
+                                        many cells; at most 3; 0: 1 */
+    uint32_t cascade_focus;          /* brume_focus */
     uint64_t memory_budget;          /* bytes on the GPU; 0: 2 GiB */
 } brume_settings;
 
@@ -527,6 +538,23 @@ typedef enum brume_stage {
 
 BRUME_API const char *brume_stage_name(uint32_t stage);
 
+/* What LPV does within the stage of transport, as the rows of its paper's Table 1. */
+typedef enum brume_field_part {
+    BRUME_FIELD_SURFACES = 0,        /* links between cells that surfaces cut, and what these reflect */
+    BRUME_FIELD_MEDIUM = 1,
+    BRUME_FIELD_REFLECTED = 2,       /* injection of what surfaces reflect first, */
+    BRUME_FIELD_SCATTERED = 3,       /* and of what media scatter first */
+    BRUME_FIELD_BLOCKERS = 4,        /* fuzzy ones: injection, */
+    BRUME_FIELD_AGGREGATE = 5,       /* the greatest of all maps, */
+    BRUME_FIELD_PREPARE = 6,         /* and factors of links */
+    BRUME_FIELD_INFLOW = 7,          /* into a lattice from the one around it */
+    BRUME_FIELD_ITERATIONS = 8,
+    BRUME_FIELD_COPY = 9,            /* into the lattice that the view looks up */
+    BRUME_FIELD_PARTS = 10
+} brume_field_part;
+
+BRUME_API const char *brume_field_part_name(uint32_t part);
+
 typedef struct brume_stage_stats {
     double wall_ms;                  /* of this job, all samples together */
     double gpu_ms;                   /* by the GL's timer */
@@ -546,9 +574,10 @@ typedef struct brume_stats {
     uint32_t lights_propagated;  /* lamps whose light was carried through the medium anew */
     uint32_t sky_propagated;     /* how often the world's was */
     uint32_t iterations;         /* of scattered and reflected light, by this job */
-    double power_begun;          /* W of all colours: what these began with, */
-    double power_in_flight;      /* and what the last one left that had not left the lattice or been
+    double power_begun;          /* W of all colours: what these began with in the whole lattice, */
+    double power_in_flight;      /* and what the last one left there that had not left it or been
                                     absorbed */
+    double field_ms[10];         /* by the GL's timer: brume_field_part */
 } brume_stats;
 
 typedef struct brume_job brume_job;

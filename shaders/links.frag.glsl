@@ -3,7 +3,7 @@
 // so that each pixel's centre is a line through cells' centres: a fragment is a cut, exactly.
 #version 450 core
 #include "lib/material.glsl"
-#include "lib/links.glsl"
+#include "lib/level.glsl"
 
 in vec3 world_position;
 in vec2 uv;
@@ -16,7 +16,7 @@ layout(binding = SLOT_OUTPUT_WALLS, r32ui) uniform uimage3D walls_image;
 // Diffuse reflectance in 1/255, and a count.
 void add_wall(ivec3 cell, vec3 reflectance)
 {
-    if (!in_field(cell))
+    if (!in_level(cell))
         return;
     ivec3 texel = ivec3(WALL_TEXELS * cell.x, cell.yz);
     uvec3 parts = uvec3(clamp(reflectance, 0.0, 1.0) * 255.0 + 0.5);
@@ -34,13 +34,13 @@ void main()
         discard;
     ivec3 link = LINKS[stage.info.y];
     int axis = link.x != 0 ? 0 : (link.y != 0 ? 1 : 2);
-    vec3 at = (world_position - frame.field_lower.xyz) / frame.field_lower.w - 0.5 + ASIDE;
+    vec3 at = (world_position - level.lower.xyz) / level.lower.w - 0.5 + ASIDE;
     float along = floor(at[axis]);
     ivec3 cell = ivec3(round(at - (at[axis] - along) * vec3(link)));
     cell[axis] = int(along);
     if (in_links(cell))
         imageAtomicOr(links_image, links_texel(cell), 1u << stage.info.y);
-    if (stage.info.y < 3u && in_field(cell))
+    if (stage.info.y < 3u && in_level(cell))
         imageAtomicMax(walls_image, ivec3(WALL_TEXELS * cell.x + 4 + axis, cell.yz),
                        uint((at[axis] - along) * 253.0) + 1u);
     vec3 reflectance = material.diffuse.rgb * base.rgb;

@@ -4,7 +4,7 @@
 // leaves a surface without being blocked by it (Kaplanyan and Dachsbacher, I3D 2010, sec. 3.3).
 #version 450 core
 #include "lib/shadow.glsl"
-#include "lib/links.glsl"
+#include "lib/level.glsl"
 #include "lib/fuzzy.glsl"
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
@@ -48,9 +48,9 @@ void main()
     if (abs(cosine) < LEAST_COSINE)
         return;
     normal *= sign(cosine); // both sides of a surface are the same
-    float side = frame.field_lower.w;
+    float side = level.lower.w;
     area /= abs(cosine) * side * side;
-    ivec3 cell = ivec3(floor((p - frame.field_lower.xyz) / side + 0.5 + ASIDE));
+    ivec3 cell = ivec3(floor((p - level.lower.xyz) / side + 0.5 + ASIDE));
     if (!in_blockers(cell))
         return;
     vec3 squares = normal * normal;

@@ -3,7 +3,7 @@
 // iterations that need it: 8 bits each, those of links 0 to 12 in one texel, of their opposites in
 // the next.
 #version 450 core
-#include "lib/links.glsl"
+#include "lib/level.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
@@ -29,7 +29,7 @@ vec4 blocking(vec3 at)
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
-    if (!in_field(cell) || cell.z >= stage.slab.w)
+    if (!in_level(cell) || cell.z >= stage.slab.w)
         return;
     for (int backwards = 0; backwards < 2; ++backwards) {
         uvec4 factors = uvec4(0u);

@@ -3,7 +3,7 @@
 // mean reflectance of the surfaces that cut its links.
 #version 450 core
 #include "lib/medium.glsl"
-#include "lib/links.glsl"
+#include "lib/level.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
@@ -22,10 +22,10 @@ const int SAMPLES = 4; // along a side
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
-    if (!in_field(cell) || cell.z >= stage.slab.w)
+    if (!in_level(cell) || cell.z >= stage.slab.w)
         return;
-    float side = frame.field_lower.w;
-    vec3 lower = frame.field_lower.xyz + vec3(cell) * side;
+    float side = level.lower.w;
+    vec3 lower = level.lower.xyz + vec3(cell) * side;
     // A strong forward lobe is as no scattering: the lattice scatters isotropically, with the
     // reduced coefficient sigma_s (1 - g).
     vec3 extinct = vec3(0.0), scatter = vec3(0.0);

@@ -5,7 +5,7 @@
 #version 450 core
 #include "lib/transmittance.glsl"
 #include "lib/shadow.glsl"
-#include "lib/links.glsl"
+#include "lib/level.glsl"
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
@@ -44,7 +44,7 @@ vec3 texel_power(vec3 p, out vec3 towards)
 
 ivec3 cell_at(vec3 p)
 {
-    return ivec3(floor((p - frame.field_lower.xyz) / frame.field_lower.w));
+    return ivec3(floor((p - level.lower.xyz) / level.lower.w));
 }
 
 // Whether a surface cuts the link between two neighbours; far ones are taken to be parted.
@@ -73,13 +73,13 @@ void main()
     axis = texelFetch(rsm[1], texel, 0).xyz;
     if (dot(axis, towards) < 0.0)
         axis = -axis; // both sides of a surface are the same
-    float reach = 0.5 * frame.field_lower.w * (abs(axis.x) + abs(axis.y) + abs(axis.z));
+    float reach = 0.5 * level.lower.w * (abs(axis.x) + abs(axis.y) + abs(axis.z));
     ivec3 cell = cell_at(p + axis * reach);
     // In a wedge's tip the other wall may be nearer than that. Towards the light nothing is.
     ivec3 towards_light = cell_at(p + towards * (reach / max(dot(axis, towards), 0.5)));
     if (is_parted(cell, towards_light))
         cell = towards_light;
-    if (!in_field(cell))
+    if (!in_level(cell))
         return;
-    gl_Position = tiled_position(cell, frame.field_dims.xyz, stage.tiles.x);
+    gl_Position = tiled_position(cell, level.dims.xyz, stage.tiles.x);
 }

@@ -7,6 +7,7 @@
 #include "lib/shadow.glsl"
 #include "lib/sky.glsl"
 #include "lib/flow.glsl"
+#include "lib/level.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
@@ -77,8 +78,8 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
 // All that a cell begins with, and its power.
 float begin(ivec3 cell)
 {
-    float side = frame.field_lower.w;
-    ivec2 texel = tiled_texel(cell, frame.field_dims.xyz, stage.offset.y);
+    float side = level.lower.w;
+    ivec2 texel = tiled_texel(cell, level.dims.xyz, stage.offset.y);
     vec4 flow[3];
     for (int c = 0; c < 3; ++c)
         flow[c] = texelFetch(reflected[c], texel, 0);
@@ -87,7 +88,7 @@ float begin(ivec3 cell)
         float part = side / float(SAMPLES);
         for (uint i = 0u; i < uint(SAMPLES * SAMPLES * SAMPLES); ++i) {
             // No lots: what is turned by a right angle is lit alike.
-            vec3 p = frame.field_lower.xyz + vec3(cell) * side +
+            vec3 p = level.lower.xyz + vec3(cell) * side +
                      (vec3(i & 1u, i >> 1u & 1u, i >> 2u) + 0.5) * part;
             add_scattered(flow, p, part, start + i);
         }
@@ -103,5 +104,5 @@ float begin(ivec3 cell)
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
-    sum_power(in_field(cell) && cell.z < stage.slab.w ? begin(cell) : 0.0);
+    sum_power(in_level(cell) && cell.z < stage.slab.w ? begin(cell) : 0.0);
 }

@@ -125,9 +125,9 @@ vec3 world_specular(surface s, vec3 p, ivec2 pixel, float within)
 // Light that was scattered or reflected before. What mirrors show of it is as soft as the lattice.
 vec3 field_surface(surface s, vec3 p)
 {
-    if (!field_reaches(p + s.normal * (0.5 * frame.field_lower.w)))
+    if (!field_reaches(p + s.normal * (0.5 * frame.fields[0].lower.w)))
         return vec3(0.0);
-    field_light light = field_before(p, s.normal);
+    field_light light = field_at(p, s.normal, frame.field.x - 1);
     return s.diffuse * field_irradiance(light, s.normal) / PI +
            s.specular * field_radiance(light, reflect(-s.view, s.normal));
 }

@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-ABI = 4
+ABI = 5
 PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONMENT",
           "TRANSMITTANCE", "VOLUME_INDIRECT")
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3, 3)
@@ -160,6 +160,7 @@ class Settings(Structure):
                 ("shadow_resolution", c_int32), ("light_samples", c_int32),
                 ("world_samples", c_int32), ("step", c_float), ("depths", c_uint32),
                 ("light_paths", c_uint32), ("blockers", c_uint32), ("field_resolution", c_int32),
+                ("cascades", c_int32), ("cascade_focus", c_uint32),
                 ("memory_budget", c_uint64)]
 
 
@@ -185,7 +186,7 @@ class Stats(Structure):
                 ("samples", c_uint32), ("shadow_maps_drawn", c_uint32),
                 ("lights_propagated", c_uint32), ("sky_propagated", c_uint32),
                 ("iterations", c_uint32), ("power_begun", c_double),
-                ("power_in_flight", c_double)]
+                ("power_in_flight", c_double), ("field_ms", c_double * 10)]
 
 
 class JobStatus(Structure):
@@ -241,6 +242,7 @@ _FUNCTIONS = {
     "brume_pass_channels": (c_uint32, [c_uint32]),
     "brume_pass_name": (c_char_p, [c_uint32]),
     "brume_stage_name": (c_char_p, [c_uint32]),
+    "brume_field_part_name": (c_char_p, [c_uint32]),
     "brume_render": (_RESULT, [c_void_p, POINTER(Settings), POINTER(View), POINTER(c_void_p)]),
     "brume_job_poll": (_RESULT, [c_void_p, POINTER(JobStatus)]),
     "brume_job_wait": (_RESULT, [c_void_p, c_int32, POINTER(JobStatus)]),

@@ -32,3 +32,37 @@ void timer_end(struct timer *timer, double *wall_ms, double *gpu_ms)
     if (end > begin)
         *gpu_ms += (double)(end - begin) * 1e-6;
 }
+
+static void mark(struct laps *laps, int kind)
+{
+    GLuint *query = &laps->queries[laps->count];
+    glCreateQueries(GL_TIMESTAMP, 1, query);
+    glQueryCounter(*query, GL_TIMESTAMP);
+    laps->kinds[laps->count++] = kind;
+}
+
+void laps_go(struct laps *laps, int kind)
+{
+    if (laps->count && laps->kinds[laps->count - 1] == kind)
+        return;
+    if (laps->count == LAPS - 1)
+        laps_end(laps);
+    mark(laps, kind);
+}
+
+void laps_end(struct laps *laps)
+{
+    if (!laps->count)
+        return;
+    mark(laps, -1);
+    GLuint64 before = 0;
+    for (int i = 0; i < laps->count; ++i) {
+        GLuint64 now = 0;
+        glGetQueryObjectui64v(laps->queries[i], GL_QUERY_RESULT, &now);
+        if (i > 0 && now > before)
+            laps->sums_ms[laps->kinds[i - 1]] += (double)(now - before) * 1e-6;
+        before = now;
+    }
+    glDeleteQueries(laps->count, laps->queries);
+    laps->count = 0;
+}

@@ -17,4 +17,19 @@ void timer_begin(struct timer *timer, const char *name);
 /* Waits for the GPU, closes the group, adds to the two sums. */
 void timer_end(struct timer *timer, double *wall_ms, double *gpu_ms);
 
+/* Pieces of work, one after another, each added to the sum of its kind: the GPU's time, for which
+ * nothing waits before the end. */
+#define LAPS 256
+
+struct laps {
+    double *sums_ms; /* one a kind */
+    GLuint queries[LAPS];
+    int kinds[LAPS], count;
+};
+
+/* What follows is of that kind. */
+void laps_go(struct laps *laps, int kind);
+/* Waits for the GPU and adds to the sums. */
+void laps_end(struct laps *laps);
+
 #endif

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #define SKY_NODE_BYTES 24 /* three times four halves */
+#define FAR 1e30f
 
 struct box {
     float lower[3], upper[3];
@@ -171,18 +172,23 @@ int lattice_wants_field(const brume_settings *settings)
            settings->light_paths != BRUME_PATHS_SINGLE;
 }
 
-static uint64_t field_cell_bytes(const brume_settings *settings)
+static uint64_t field_working_bytes(const brume_settings *settings)
 {
-    return FIELD_CELL_BYTES + FIELD_WORKING_BYTES +
+    return FIELD_WORKING_BYTES +
            (settings->blockers == BRUME_BLOCKERS_FUZZY ? FIELD_FUZZY_BYTES : 0);
 }
 
-uint64_t lattice_field_bytes(const brume_settings *settings)
+static uint64_t field_bytes(const brume_settings *settings, const struct gpu_field *fields,
+                            int levels)
 {
-    const uint64_t cells = (uint64_t)settings->field_resolution;
-    return lattice_wants_field(settings)
-               ? cells * cells * cells * field_cell_bytes(settings) + FIELD_FIXED_BYTES
-               : 0;
+    uint64_t all = 0, most = 0;
+    for (int i = 0; i < levels; ++i) {
+        const ivec4 dims = fields[i].dims;
+        const uint64_t cells = (uint64_t)dims.x * (uint64_t)dims.y * (uint64_t)dims.z;
+        all += cells;
+        most = cells > most ? cells : most;
+    }
+    return all * FIELD_CELL_BYTES + most * field_working_bytes(settings) + FIELD_FIXED_BYTES;
 }
 
 static void box_grow(struct box *box, float margin)
@@ -223,38 +229,107 @@ static struct box field_box(const struct renderer *renderer, const struct snapsh
     return box;
 }
 
+static void box_of(const struct gpu_field *field, struct box *box)
+{
+    for (int i = 0; i < 3; ++i) {
+        box->lower[i] = (&field->lower.x)[i];
+        box->upper[i] = box->lower[i] + (float)(&field->dims.x)[i] * field->lower.w;
+    }
+}
+
 /* The box in the middle, and along its longest side nothing but it: walls, which are often its sides,
  * are where cells end. */
-static void layout_field(struct renderer *renderer, const struct render_request *request)
+static struct gpu_field whole_field(const struct box *box, int resolution)
+{
+    const float cell = fmaxf(longest(box), 1e-6f) / ((float)resolution - 0.02f);
+    struct gpu_field field = {.lower = {.w = cell},
+                              .keep_lower = {-FAR, -FAR, -FAR, 0},
+                              .keep_upper = {FAR, FAR, FAR, 0}};
+    for (int i = 0; i < 3; ++i) {
+        const int needed = (int)ceilf((box->upper[i] - box->lower[i]) / cell);
+        const int dims = needed < 1 ? 1 : needed;
+        (&field.dims.x)[i] = dims;
+        (&field.lower.x)[i] = 0.5f * (box->lower[i] + box->upper[i] - (float)dims * cell);
+    }
+    return field;
+}
+
+/* The point that finer lattices surround: of a box this long, before a camera near its side. */
+static void focus_of(const struct renderer *renderer, const struct render_request *request,
+                     float length, float focus[3])
+{
+    const struct medium_textures *medium = &renderer->medium;
+    if (request->settings.cascade_focus == BRUME_FOCUS_MEDIUM && medium->dims[0]) {
+        for (int i = 0; i < 3; ++i)
+            focus[i] = 0.5f * (medium->lower[i] + medium->upper[i]);
+        return;
+    }
+    const float *view = request->view.view_from_world;
+    float world[16];
+    mat4_invert(view, world); /* checked when the request was made */
+    for (int i = 0; i < 3; ++i)
+        focus[i] = world[12 + i] - view[4 * i + 2] * (0.4f * length);
+}
+
+/* Half as long as the one around it, of whole cells of that one. It follows the focus in steps, so that
+ * small moves change nothing. Where both end nothing gives way. */
+static struct gpu_field field_within(const struct gpu_field *around, const float focus[3])
+{
+    struct gpu_field field = {.lower = {.w = 0.5f * around->lower.w}};
+    for (int i = 0; i < 3; ++i) {
+        const int all = (&around->dims.x)[i], cells = (all + 1) / 2;
+        const int step = cells / 8 ? cells / 8 : 1;
+        const float begin = (&around->lower.x)[i], cell = around->lower.w;
+        const float wanted = ((focus[i] - begin) / cell - 0.5f * (float)cells) / (float)step;
+        int first = (int)floorf(fmaxf(fminf(wanted, 1e6f), 0.0f) + 0.5f) * step;
+        first = first < all - cells ? first : all - cells;
+        const float lower = begin + (float)first * cell;
+        const float upper = lower + (float)cells * cell;
+        (&field.dims.x)[i] = 2 * cells;
+        (&field.lower.x)[i] = lower;
+        (&field.keep_lower.x)[i] =
+            first == 0 ? (&around->keep_lower.x)[i] : lower + 0.5f * field.lower.w;
+        (&field.keep_upper.x)[i] =
+            first == all - cells ? (&around->keep_upper.x)[i] : upper - 0.5f * field.lower.w;
+    }
+    field.dims.w = around->dims.w + around->dims.z;
+    return field;
+}
+
+/* Fills frame->fields for as many cells as fit the budget. Returns how many along the longest side. */
+static int layout_field(struct renderer *renderer, const struct render_request *request)
 {
     struct gpu_frame *frame = &renderer->frame;
     const brume_settings *settings = &request->settings;
     const struct box box = field_box(renderer, request->snapshot);
-    frame->field_dims = (ivec4){0};
+    frame->field = (ivec4){0};
+    memset(frame->fields, 0, sizeof frame->fields);
     if (!lattice_wants_field(settings) || box_is_empty(&box))
-        return;
+        return settings->field_resolution;
     int resolution = settings->field_resolution < 2 ? 2 : settings->field_resolution;
+    frame->field.x = settings->cascades;
     for (;; resolution = resolution * 3 / 4) {
-        const float cell = fmaxf(longest(&box), 1e-6f) / ((float)resolution - 0.02f);
-        int *dims = &frame->field_dims.x;
-        float lower[3];
-        uint64_t cells = 1;
-        for (int i = 0; i < 3; ++i) {
-            const int needed = (int)ceilf((box.upper[i] - box.lower[i]) / cell);
-            dims[i] = needed < 1 ? 1 : needed;
-            lower[i] = 0.5f * (box.lower[i] + box.upper[i] - (float)dims[i] * cell);
-            cells *= (uint64_t)dims[i];
+        frame->fields[0] = whole_field(&box, resolution);
+        for (int i = 1; i < settings->cascades; ++i) {
+            struct box around;
+            float focus[3];
+            box_of(&frame->fields[i - 1], &around);
+            focus_of(renderer, request, 0.5f * longest(&around), focus);
+            frame->fields[i] = field_within(&frame->fields[i - 1], focus);
         }
-        frame->field_lower = pack(lower, cell);
-        frame->field_dims.w = 1;
-        if (cells * field_cell_bytes(settings) + FIELD_FIXED_BYTES <= renderer->shares.field ||
+        if (field_bytes(settings, frame->fields, settings->cascades) <= renderer->shares.field ||
             resolution <= 4)
-            break;
+            return resolution;
     }
-    if (resolution < settings->field_resolution)
-        job_warn(request->control, "FIELD_COARSER",
-                 "lattice of scattered light of %d instead of %d cells, to keep the memory budget",
-                 resolution, settings->field_resolution);
+}
+
+void lattice_place(struct renderer *renderer, const struct render_request *request)
+{
+    struct gpu_frame *frame = &renderer->frame;
+    frame->fog_lower = frame->fog_upper = (vec4){0};
+    frame->fog_sigma_s = frame->fog_sigma_t = frame->fog_emission = (vec4){0};
+    layout_fog(renderer, request->snapshot);
+    renderer->field_resolution = layout_field(renderer, request);
 }
 
 brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
@@ -266,14 +341,14 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
     frame->medium_dims = (ivec4){0};
     frame->lattice_dims = (ivec4){0};
     frame->sky_dims = (ivec4){0};
-    frame->fog_lower = frame->fog_upper = (vec4){0};
-    frame->fog_sigma_s = frame->fog_sigma_t = frame->fog_emission = (vec4){0};
     memset(renderer->tau_size, 0, sizeof renderer->tau_size);
     /* No tile is left from a medium that is gone. */
     for (uint32_t i = 0; i < renderer->shadows.light_count; ++i)
         renderer->shadows.lights[i].info.w = 0;
-    layout_fog(renderer, request->snapshot);
-    layout_field(renderer, request);
+    if (renderer->field_resolution < settings->field_resolution)
+        job_warn(request->control, "FIELD_COARSER",
+                 "lattice of scattered light of %d instead of %d cells, to keep the memory budget",
+                 renderer->field_resolution, settings->field_resolution);
     /* The sky's lattice needs a cell's size to march by, medium or not. */
     frame->medium_lower = (vec4){0, 0, 0, 1};
 

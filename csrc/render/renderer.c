@@ -24,6 +24,7 @@ struct run {
     struct gpu *gpu;
     struct renderer *renderer;
     struct render_request *request;
+    uint64_t field_inputs; /* signature of what light that goes on depends on, but for its lattices */
 };
 
 /* --- Signatures: what a stage depends on -------------------------------------------------- */
@@ -220,12 +221,13 @@ static brume_result work_transport(struct run *run)
         .light_count = renderer->shadows.light_count,
         .medium_revision = renderer->stages[BRUME_STAGE_MEDIUM].revision,
         .world_signature = renderer->shadows.world_signature,
+        .signature = run->field_inputs,
         .world_first = renderer->shadows.world_first,
         .world_count = renderer->shadows.world_count,
         .stats = &request->stats,
         .tau_size = {renderer->tau_size[0], renderer->tau_size[1], renderer->tau_size[2]},
     };
-    if (!renderer->frame.field_dims.w) /* left by another method, or by other paths */
+    if (!renderer->frame.field.x) /* left by another method, or by other paths */
         texture_finish(&run->gpu->memory, &renderer->transport.field);
     return method->run(&renderer->transport, &input);
 }
@@ -501,6 +503,7 @@ static brume_result run_stages(struct run *run)
                                renderer->shadow_plan.light_samples,
                                renderer->shadow_plan.world_samples};
     TRY(run_if_changed(run, BRUME_STAGE_SHADOW, shadow, 6, work_shadow));
+    lattice_place(renderer, request);
     const uint64_t transport[] = {stages[BRUME_STAGE_MEDIUM].revision,
                                   stages[BRUME_STAGE_SHADOW].revision,
                                   (uint64_t)settings->lattice_resolution,
@@ -508,14 +511,16 @@ static brume_result run_stages(struct run *run)
                                   settings->depths,
                                   least(shares->depth, lattice_depth_bytes(renderer, settings)),
                                   least(shares->sky, lattice_sky_bytes(settings)),
-                                  least(shares->field, lattice_field_bytes(settings)),
                                   (uint64_t)settings->iterations,
                                   (uint64_t)settings->field_resolution,
-                                  lattice_wants_field(settings),
                                   settings->light_paths == BRUME_PATHS_ALL,
                                   settings->blockers,
                                   float_bits(snapshot->world.reach)};
-    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 14, work_transport));
+    run->field_inputs = signature(transport, sizeof transport / sizeof *transport);
+    const uint64_t lattices[] = {
+        run->field_inputs,
+        hash_bytes(HASH_START, renderer->frame.fields, sizeof renderer->frame.fields)};
+    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, lattices, 2, work_transport));
     collect_warnings(run);
     return BRUME_OK;
 }
@@ -523,7 +528,7 @@ static brume_result run_stages(struct run *run)
 brume_result renderer_step(struct gpu *gpu, struct renderer *renderer,
                            struct render_request *request, bool *more)
 {
-    struct run run = {gpu, renderer, request};
+    struct run run = {gpu, renderer, request, 0};
     const double started = clock_ms();
     *more = false;
     brume_result result = BRUME_OK;

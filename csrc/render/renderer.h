@@ -32,6 +32,7 @@ struct renderer {
     struct gpu_frame frame;
     struct buffer frame_block;
     int tau_size[3];
+    int field_resolution; /* cells of the frame's lattice of scattered light */
     struct shares shares;
     struct shadow_plan shadow_plan;
 };

@@ -105,6 +105,9 @@ static void print_stats(const brume_job *job)
     for (uint32_t i = 0; i < BRUME_STAGE_COUNT; i++)
         printf("%-12s %10.1f %10.1f\n", brume_stage_name(i), stats.stages[i].wall_ms,
                stats.stages[i].gpu_ms);
+    for (uint32_t i = 0; i < BRUME_FIELD_PARTS; i++)
+        if (stats.field_ms[i] > 0.0)
+            printf("  %-21s %10.1f\n", brume_field_part_name(i), stats.field_ms[i]);
     printf("%-12s %10.1f\n", "total", stats.total_ms);
     printf("%-12s %10.1f MiB\n%-12s %10.1f MiB\n", "GPU memory", (double)stats.total_bytes / mib,
            "at its peak", (double)stats.peak_bytes / mib);

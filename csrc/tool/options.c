@@ -74,6 +74,8 @@ static const char help[] =
     "                              they and surfaces go on to scatter\n"
     "      --field-resolution N    lpv: cells along the longest side of the lattice in which that\n"
     "                              goes on (default: half of --lattice-resolution)\n"
+    "      --cascades N            lpv: such lattices, each within the last around the medium, half\n"
+    "                              as long with as many cells (1 to 3, default: 1)\n"
     "      --iterations N          lpv: how many cells far (default: until it converged)\n"
     "      --blockers KIND         what keeps LPV's light from passing surfaces: links (exact,\n"
     "                              the default) or fuzzy (as published, leaks; to compare)\n"
@@ -487,6 +489,7 @@ static const struct spec specs[] = {
     {"half-march", KIND_FLAG, AT(half_march)},
     {"method", KIND_OWN, .parse = parse_method},
     {"field-resolution", KIND_COUNT, AT(settings.field_resolution), .upper = 256},
+    {"cascades", KIND_COUNT, AT(settings.cascades), .upper = 3},
     {"iterations", KIND_COUNT, AT(settings.iterations), .upper = 100000},
     {"depths", KIND_OWN, .parse = parse_depths},
     {"blockers", KIND_OWN, .parse = parse_blockers},

@@ -7,7 +7,7 @@
 
 /* Bytes of a cell: of the field, and of what is needed while it is found. */
 #define FIELD_CELL_BYTES 64
-#define FIELD_WORKING_BYTES 252 /* and one layer more of what is cut */
+#define FIELD_WORKING_BYTES 252 /* of the largest; and one layer more of what is cut */
 #define FIELD_FUZZY_BYTES 96 /* the same, for fuzzy blockers, and one layer more of their lattice */
 /* Beside the lattice: reflective shadow maps, and blocks. */
 #define FIELD_FIXED_BYTES (3u << 20)
@@ -23,9 +23,12 @@ struct lpv_fuzzy {
     GLuint target;                  /* framebuffer of the sums */
 };
 
-/* One run. Textures of the lattice's size, colours apart. */
+/* One run over one lattice. Textures of its size, colours apart. */
 struct lpv_work {
     const struct transport_input *input;
+    const struct gpu_field *field;  /* the lattice, of the frame */
+    int number;                     /* of it there: 0 the whole */
+    struct buffer level;            /* the same for shaders */
     struct opv_work passes;         /* the block of lattice passes, and how far it is */
     struct texture flow[2][3];      /* light in flight, before and after an iteration */
     struct texture sums[3];         /* what has passed through a cell: the field */
@@ -33,11 +36,12 @@ struct lpv_work {
     struct texture links, walls;    /* links that surfaces cut; sums of their reflectances */
     struct texture reflected[3];    /* what surfaces reflect first, the lattice's layers as tiles */
     int tiles;                      /* of these in a row */
+    struct laps *laps;              /* the time of each part, of all lattices */
     struct buffer powers;           /* in flight, a group of the last iteration */
     struct lpv_fuzzy fuzzy;         /* nothing, where links block */
 };
 
-/* Runs a program over a lattice, in slabs; textures and images are bound. */
+/* Runs a program over the lattice, or another, in slabs; textures and images are bound. */
 brume_result lpv_over_lattice(struct lpv_work *work, const char *stem, ivec4 offset,
                               const ivec4 *dims);
 /* The layers of a lattice, tiles of a picture: the rows of these, with so many in each. */

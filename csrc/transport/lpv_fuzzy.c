@@ -8,6 +8,7 @@
  * counts, for the six sides of a cell apart. Sums over all sets would block as often as there are
  * lights, and without sides apart, the front of a thin wall would hide its back. */
 #include "base/result.h"
+#include "gl/timer.h"
 #include "transport/lpv.h"
 
 #include <math.h>
@@ -30,7 +31,7 @@ brume_result lpv_fuzzy_begin(struct lpv_work *work)
     static const uint32_t none;
     struct memory *memory = &work->input->gpu->memory;
     struct lpv_fuzzy *fuzzy = &work->fuzzy;
-    const ivec4 field = work->input->frame->field_dims;
+    const ivec4 field = work->field->dims;
     const ivec4 dims = {field.x + 1, field.y + 1, field.z + 1,
                         (int)ceil(sqrt((double)field.z + 1.0))};
     const int rows = lpv_tile_rows(&dims, dims.w);
@@ -84,6 +85,7 @@ static brume_result over_lattice(struct lpv_work *work, const char *stem, const 
 brume_result lpv_fuzzy_keep(struct lpv_work *work)
 {
     struct lpv_fuzzy *fuzzy = &work->fuzzy;
+    laps_go(work->laps, BRUME_FIELD_AGGREGATE);
     for (GLuint i = 0; i < 2; ++i) {
         glBindTextureUnit(SLOT_AREAS + i, fuzzy->sums[i].id);
         glBindImageTexture(SLOT_OUTPUT + i, fuzzy->areas[i].id, 0, GL_TRUE, 0, GL_READ_WRITE,
@@ -97,9 +99,9 @@ brume_result lpv_fuzzy_keep(struct lpv_work *work)
 int lpv_fuzzy_view(const struct lpv_work *work, int axis, bool from_end, int most,
                    struct gpu_shadow_view *out)
 {
-    const struct gpu_frame *frame = work->input->frame;
+    const struct gpu_field *field = work->field;
     const int *dims = &work->fuzzy.dims.x;
-    const float cell = frame->field_lower.w;
+    const float cell = field->lower.w;
     int longest = dims[0];
     for (int i = 1; i < 3; ++i)
         longest = dims[i] > longest ? dims[i] : longest;
@@ -108,7 +110,7 @@ int lpv_fuzzy_view(const struct lpv_work *work, int axis, bool from_end, int mos
     const int side = longest < most ? most / longest * longest : most;
     float lower[3];
     for (int i = 0; i < 3; ++i)
-        lower[i] = (&frame->field_lower.x)[i] - 0.5f * cell;
+        lower[i] = (&field->lower.x)[i] - 0.5f * cell;
     mat4 view = {{0}};
     for (int row = 0; row < 2; ++row) {
         const int other = (axis + 1 + row) % 3;
@@ -131,5 +133,5 @@ brume_result lpv_fuzzy_prepare(struct lpv_work *work)
         glBindTextureUnit(SLOT_AREAS + i, work->fuzzy.areas[i].id);
     glBindImageTexture(SLOT_OUTPUT, work->fuzzy.factors.id, 0, GL_TRUE, 0, GL_WRITE_ONLY,
                        GL_RGBA32UI);
-    return over_lattice(work, "lpv_fuzzy_prepare", &work->input->frame->field_dims);
+    return over_lattice(work, "lpv_fuzzy_prepare", &work->field->dims);
 }

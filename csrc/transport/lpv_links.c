@@ -14,12 +14,12 @@ static const int links[LINKS][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 0
                                     {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
 
 /* The view along a link: an affine map, sheared. `size`: its pixels. */
-static mat4 view_along(const struct gpu_frame *frame, const int link[3], int size[2])
+static mat4 view_along(const struct gpu_field *field, const int link[3], int size[2])
 {
     static const double aside[3] = {(double)ASIDE_X, (double)ASIDE_Y, (double)ASIDE_Z};
-    const float *lower = &frame->field_lower.x;
-    const int *dims = &frame->field_dims.x;
-    const double per_m = 1.0 / (double)frame->field_lower.w;
+    const float *lower = &field->lower.x;
+    const int *dims = &field->dims.x;
+    const double per_m = 1.0 / (double)field->lower.w;
     const int axis = link[0] ? 0 : (link[1] ? 1 : 2);
     mat4 view = {{0}};
     double origin[3]; /* in cells, where the world's origin is */
@@ -49,7 +49,7 @@ static brume_result draw(struct lpv_work *work, GLuint framebuffer)
     const struct transport_input *input = work->input;
     for (int i = 0; i < LINKS; ++i) {
         int size[2];
-        const struct gpu_draw stage = {.clip_from_world = view_along(input->frame, links[i], size),
+        const struct gpu_draw stage = {.clip_from_world = view_along(work->field, links[i], size),
                                        .info = {0, (uint32_t)i, 0, 0}};
         glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_WIDTH, size[0]);
         glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_HEIGHT, size[1]);

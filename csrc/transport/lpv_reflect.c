@@ -2,6 +2,7 @@
 /* What surfaces reflect of the lights' own light: reflective shadow maps, one after another, each
  * strewn into the lattice as points that add up. */
 #include "base/result.h"
+#include "gl/timer.h"
 #include "scene/light_view.h"
 #include "transport/lpv.h"
 
@@ -112,10 +113,14 @@ static brume_result one_map(struct lpv_work *work, struct maps *maps,
                             const struct gpu_shadow_view *view, ivec4 what, float scale)
 {
     const int texels = what.w * what.w;
+    laps_go(work->laps, BRUME_FIELD_REFLECTED);
     TRY(draw_map(work, maps, view, what, scale));
-    TRY(lpv_strew(work, "lpv_reflect", maps->target, &work->input->frame->field_dims, work->tiles,
+    TRY(lpv_strew(work, "lpv_reflect", maps->target, &work->field->dims, work->tiles,
                   texels));
-    return lpv_is_fuzzy(work) ? lpv_fuzzy_add(work, texels) : BRUME_OK;
+    if (!lpv_is_fuzzy(work))
+        return BRUME_OK;
+    laps_go(work->laps, BRUME_FIELD_BLOCKERS);
+    return lpv_fuzzy_add(work, texels);
 }
 
 /* Of one sample of a light all has been drawn. */
@@ -131,6 +136,7 @@ static brume_result see_from_outside(struct lpv_work *work, struct maps *maps)
 {
     for (int i = 0; i < 6; ++i) {
         struct gpu_shadow_view view;
+        laps_go(work->laps, BRUME_FIELD_BLOCKERS);
         const int side = lpv_fuzzy_view(work, i % 3, i >= 3, SUN_SIDE, &view);
         TRY(draw_map(work, maps, &view, (ivec4){-1, 0, 0, side}, 0.0f));
         TRY(lpv_fuzzy_add(work, side * side));
@@ -139,12 +145,12 @@ static brume_result see_from_outside(struct lpv_work *work, struct maps *maps)
     return BRUME_OK;
 }
 
-static void field_box(const struct gpu_frame *frame, float lower[3], float upper[3])
+static void field_box(const struct gpu_field *field, float lower[3], float upper[3])
 {
-    const int *dims = &frame->field_dims.x;
+    const int *dims = &field->dims.x;
     for (int i = 0; i < 3; ++i) {
-        lower[i] = (&frame->field_lower.x)[i];
-        upper[i] = lower[i] + (float)dims[i] * frame->field_lower.w;
+        lower[i] = (&field->lower.x)[i];
+        upper[i] = lower[i] + (float)dims[i] * field->lower.w;
     }
 }
 
@@ -155,7 +161,7 @@ static brume_result distant(struct lpv_work *work, struct maps *maps, const vec4
     const struct transport_input *input = work->input;
     float lower[3], upper[3];
     struct gpu_shadow_view view;
-    field_box(input->frame, lower, upper);
+    field_box(work->field, lower, upper);
     light_view_distant(input->geometry->lower, input->geometry->upper, lower, upper, towards,
                        what.w, &view);
     TRY(one_map(work, maps, &view, what, scale));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What surfaces block of the light on a link: shares of it.
-#include "lib/links.glsl"
+#include "lib/level.glsl"
 
 struct link_blockers
 {

@@ -12,7 +12,7 @@ struct field_light
 
 bool field_exists()
 {
-    return frame.field_dims.w != 0;
+    return frame.field.x != 0;
 }
 
 // Numbers of links by their offsets, x first; 31: there is none to the cell itself.
@@ -26,14 +26,15 @@ bool is_cut(uint cuts, ivec3 offset)
     return (cuts >> NUMBERS[9 * offset.z + 3 * offset.y + offset.x + 13] & 1u) != 0u;
 }
 
-ivec3 of_cell(ivec3 cell)
+// Where a cell's colours are in the texture: 0 to 2, or what parts it from others: 3.
+ivec3 texel_of(gpu_field field, ivec3 cell, int number)
 {
-    return cell + ivec3(3 * frame.field_dims.x, 0, 0);
+    return cell + ivec3(number * field.dims.x, 0, field.dims.w);
 }
 
 // The cell on whose side of the surfaces a point is: the nearest, or along an axis the one that no
 // cut lies before. `low`: the cell before it on all axes, f: how far it is on the way to the next.
-ivec3 home_of(ivec3 low, vec3 f, ivec3 last)
+ivec3 home_of(gpu_field field, ivec3 low, vec3 f, ivec3 last)
 {
     ivec3 home = low + ivec3(step(0.5, f));
     for (int axis = 0; axis < 3; ++axis) {
@@ -41,17 +42,17 @@ ivec3 home_of(ivec3 low, vec3 f, ivec3 last)
         before[axis] = low[axis];
         if (any(lessThan(before, ivec3(0))) || any(greaterThan(before, last)))
             continue;
-        uint where = uint(texelFetch(field_lattice, of_cell(before), 0).z) >> (8 * axis) & 255u;
+        uint where = uint(texelFetch(field_lattice, texel_of(field, before, 3), 0).z) >> (8 * axis) & 255u;
         if (where != 0u)
             home[axis] = low[axis] + (f[axis] * 253.0 + 1.0 < float(where) + 0.5 ? 0 : 1);
     }
     return clamp(home, ivec3(0), last);
 }
 
-void add_cell(inout field_light light, ivec3 cell, float weight)
+void add_cell(inout field_light light, gpu_field field, ivec3 cell, float weight)
 {
     for (int c = 0; c < 3; ++c) {
-        vec4 texel = texelFetch(field_lattice, cell + ivec3(c * frame.field_dims.x, 0, 0), 0);
+        vec4 texel = texelFetch(field_lattice, texel_of(field, cell, c), 0);
         light.fluence[c] += weight * texel.x;
         light.flux[c] += weight * texel.yzw;
     }
@@ -60,30 +61,30 @@ void add_cell(inout field_light light, ivec3 cell, float weight)
 // Interpolated between the eight cells around a point, but for those that a surface parts from the
 // cell that it belongs to, and those not before the plane (xyz: normal, w: its points' product with
 // that).
-field_light field_between(vec3 p, vec4 plane)
+field_light field_between(gpu_field field, vec3 p, vec4 plane)
 {
-    vec3 at = (p - frame.field_lower.xyz) / frame.field_lower.w - 0.5;
-    ivec3 last = frame.field_dims.xyz - 1;
+    vec3 at = (p - field.lower.xyz) / field.lower.w - 0.5;
+    ivec3 last = field.dims.xyz - 1;
     ivec3 low = ivec3(floor(at));
     vec3 f = at - vec3(low);
-    ivec3 home = home_of(low, f, last);
-    vec2 sides = texelFetch(field_lattice, of_cell(home), 0).xy;
+    ivec3 home = home_of(field, low, f, last);
+    vec2 sides = texelFetch(field_lattice, texel_of(field, home, 3), 0).xy;
     uint cuts = uint(sides.x) | uint(sides.y) << 13;
     // A cell that nearly all links to are cut is within something small, and tells nothing.
     bool within = bitCount(cuts) > 17;
     field_light light = field_light(vec3(0.0), mat3(0.0));
     float sum = 0.0;
-    int corners = 8 * frame.field_dims.w; // not unrolled, which would take seconds to compile
+    int corners = 8 * min(frame.field.x, 1); // not unrolled, which would take seconds to compile
     for (int corner = 0; corner < corners; ++corner) {
         ivec3 side = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
         ivec3 cell = clamp(low + side, ivec3(0), last);
         vec3 each = mix(1.0 - f, f, vec3(side));
         float weight = each.x * each.y * each.z;
         if (weight <= 0.0 || (within ? cell == home : is_cut(cuts, cell - home)) ||
-            dot(cell_centre(cell), plane.xyz) < plane.w)
+            dot(cell_centre(field, cell), plane.xyz) < plane.w)
             continue;
         sum += weight;
-        add_cell(light, cell, weight);
+        add_cell(light, field, cell, weight);
     }
     if (sum > 1e-3) {
         light.fluence /= sum;
@@ -91,15 +92,47 @@ field_light field_between(vec3 p, vec4 plane)
         return light;
     }
     light = field_light(vec3(0.0), mat3(0.0));
-    add_cell(light, home, 1.0);
+    add_cell(light, field, home, 1.0);
     return light;
 }
 
-// The field ends where its lattice does.
+// The field ends where its largest lattice does.
 bool field_reaches(vec3 p)
 {
-    vec3 at = (p - frame.field_lower.xyz) / frame.field_lower.w;
-    return all(greaterThan(at, vec3(0.0))) && all(lessThan(at, vec3(frame.field_dims.xyz)));
+    gpu_field field = frame.fields[0];
+    vec3 at = (p - field.lower.xyz) / field.lower.w;
+    return all(greaterThan(at, vec3(0.0))) && all(lessThan(at, vec3(field.dims.xyz)));
+}
+
+// Of the light at a point, the share that a lattice within another tells: it gives way to that one in
+// its outermost cells, so that no seam shows.
+const float GIVES_WAY = 4.0; // cells
+
+float share_of(gpu_field field, vec3 p)
+{
+    vec3 inside = min(p - field.keep_lower.xyz, field.keep_upper.xyz - p);
+    return clamp(min(inside.x, min(inside.y, inside.z)) / (GIVES_WAY * field.lower.w), 0.0, 1.0);
+}
+
+// The light at a point of no surface (normal: 0), or as it is before one, of lattices up to that number.
+field_light field_at(vec3 p, vec3 normal, int finest)
+{
+    field_light light = field_light(vec3(0.0), mat3(0.0));
+    bool surface = normal != vec3(0.0);
+    vec4 plane = vec4(normal, surface ? dot(normal, p) : -1.0);
+    float left = 1.0;
+    for (int number = finest; number >= 0 && left > 0.0; --number) {
+        gpu_field field = frame.fields[number];
+        float share = number > 0 ? left * share_of(field, p) : left;
+        if (share <= 0.0)
+            continue;
+        float reach = 0.5 * field.lower.w * (abs(normal.x) + abs(normal.y) + abs(normal.z));
+        field_light here = field_between(field, p + normal * reach, plane);
+        light.fluence += share * here.fluence;
+        light.flux += share * here.flux;
+        left -= share;
+    }
+    return light;
 }
 
 // Radiance that a medium's point scatters towards a direction, per unit of sigma_s: bands 0 and 1
@@ -108,15 +141,8 @@ vec3 field_scatter(vec3 p, vec3 out_direction, float g)
 {
     if (!field_reaches(p))
         return vec3(0.0);
-    field_light light = field_between(p, vec4(0.0, 0.0, 0.0, -1.0));
+    field_light light = field_at(p, vec3(0.0), frame.field.x - 1);
     return max(light.fluence + 3.0 * g * (out_direction * light.flux), vec3(0.0)) / (4.0 * PI);
-}
-
-// At a surface: light of bands 0 and 1 as it is before it, and the irradiance by it.
-field_light field_before(vec3 p, vec3 normal)
-{
-    float reach = 0.5 * frame.field_lower.w * (abs(normal.x) + abs(normal.y) + abs(normal.z));
-    return field_between(p + normal * reach, vec4(normal, dot(normal, p)));
 }
 
 vec3 field_irradiance(field_light light, vec3 normal)

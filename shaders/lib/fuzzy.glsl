@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The fuzzy blockers' lattice: half a cell lower than the field's, a cell more along every side.
-#include "lib/links.glsl"
+#include "lib/level.glsl"
 
 ivec3 blockers_dims()
 {
-    return frame.field_dims.xyz + 1;
+    return level.dims.xyz + 1;
 }
 
 bool in_blockers(ivec3 cell)

@@ -26,37 +26,12 @@ float link_length(int i)
     return sqrt(float(link_class(i) + 1));
 }
 
-vec3 cell_centre(ivec3 cell)
+vec3 cell_centre(gpu_field field, ivec3 cell)
 {
-    return frame.field_lower.xyz + (vec3(cell) + 0.5) * frame.field_lower.w;
+    return field.lower.xyz + (vec3(cell) + 0.5) * field.lower.w;
 }
 
-// Where a cell stands in a picture of a lattice with its layers as tiles, so many in a row.
-ivec2 tiled_texel(ivec3 cell, ivec3 dims, int row)
+bool in_field(gpu_field field, ivec3 cell)
 {
-    return ivec2(cell.z % row, cell.z / row) * dims.xy + cell.xy;
-}
-
-// The same in clip space.
-vec4 tiled_position(ivec3 cell, ivec3 dims, int row)
-{
-    vec2 place = vec2(tiled_texel(cell, dims, row)) + 0.5;
-    return vec4(place / vec2(dims.xy * ivec2(row, (dims.z + row - 1) / row)) * 2.0 - 1.0, 0.5, 1.0);
-}
-
-bool in_field(ivec3 cell)
-{
-    return all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, frame.field_dims.xyz));
-}
-
-// The picture of cut links knows the cells around the lattice, too: links from there lead into it.
-bool in_links(ivec3 cell)
-{
-    return all(greaterThanEqual(cell, ivec3(-1))) &&
-           all(lessThanEqual(cell, frame.field_dims.xyz));
-}
-
-ivec3 links_texel(ivec3 cell)
-{
-    return cell + 1;
+    return all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, field.dims.xyz));
 }

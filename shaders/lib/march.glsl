@@ -174,7 +174,7 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
     float sky_next = -1e30;
     vec3 sky = vec3(0.0);
     // So is the field's, whose look-ups are dear.
-    float field_every = max(0.5 * frame.field_lower.w, dt);
+    float field_every = max(0.5 * frame.fields[max(frame.field.x - 1, 0)].lower.w, dt);
     float field_next = -1e30;
     vec3 field = vec3(0.0);
     int first = count, end = 0; // the steps that are not empty

@@ -5,6 +5,7 @@
 // How much they block is told by one of lib/blocked_*.glsl, included before this: a switch between
 // them made an iteration a quarter longer.
 #include "lib/flow.glsl"
+#include "lib/gather.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
@@ -20,39 +21,8 @@ layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_albedo;
 layout(binding = SLOT_WALLS) uniform sampler3D cell_walls;
 
 layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D flow_image[3];
-layout(binding = SLOT_OUTPUT_FIELD, rgba32f) uniform image3D field_image[3];
 
 #include "lib/power.glsl"
-
-struct half_way
-{
-    vec3 through; // what arrives at its end
-    vec3 mean;    // m; times the power at its begin: power times path
-};
-
-half_way fly(vec3 extinct, float way)
-{
-    half_way half_;
-    vec3 tau = extinct * way;
-    half_.through = exp(-tau);
-    half_.mean = mix((1.0 - half_.through) / max(extinct, vec3(1e-20)), way * (1.0 - 0.5 * tau),
-                     lessThan(tau, vec3(1e-3)));
-    return half_;
-}
-
-struct gathered
-{
-    vec3 power;   // that arrives in the cell's middle, or is scattered on its way
-    mat3 flux;    // columns: colours
-    vec3 passed;  // power times path
-    mat3 passed_flux;
-};
-
-void add_flux(inout mat3 flux, vec3 power, vec3 direction)
-{
-    for (int c = 0; c < 3; ++c)
-        flux[c] += power[c] * direction;
-}
 
 vec3 leave(ivec3 cell, int class_, vec3 direction)
 {
@@ -65,8 +35,8 @@ void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
     vec3 in_flight = vec3(0.0);
-    if (in_field(cell) && cell.z < stage.slab.w) {
-        float side = frame.field_lower.w;
+    if (in_level(cell) && cell.z < stage.slab.w) {
+        float side = level.lower.w;
         vec3 extinct = texelFetch(cell_extinct, cell, 0).rgb;
         vec3 albedo = texelFetch(cell_albedo, cell, 0).rgb;
         vec3 wall = texelFetch(cell_walls, cell, 0).rgb;
@@ -82,7 +52,7 @@ void main()
             float way = 0.5 * side * link_length(i);
             vec3 direction = vec3(link) / link_length(i);
             ivec3 beyond = cell + link;
-            bool there = in_field(beyond);
+            bool there = in_level(beyond);
             half_way mine = fly(extinct, way);
 
             vec3 out_ = vec3(leaving(own[0], class_, direction), leaving(own[1], class_, direction),
@@ -105,19 +75,11 @@ void main()
                 begins += comes;
                 lobes += comes;
             }
-            vec3 arrives = begins * mine.through;
-            sum.power += arrives + (begins - arrives) * albedo;
-            add_flux(sum.flux, lobes * mine.through, -direction);
-            sum.passed += begins * mine.mean;
-            add_flux(sum.passed_flux, lobes * mine.mean, -direction);
+            arrive(sum, begins, lobes, mine, albedo, direction);
         }
-        float counts = intBitsToFloat(stage.offset.y) / (side * side * side);
-        for (int c = 0; c < 3; ++c) {
-            vec4 field = imageLoad(field_image[c], cell);
-            field += vec4(sum.passed[c], sum.passed_flux[c]) * counts;
-            imageStore(field_image[c], cell, field);
+        count_passed(cell, sum, intBitsToFloat(stage.offset.y));
+        for (int c = 0; c < 3; ++c)
             imageStore(flow_image[c], cell, lobe_of(vec4(sum.power[c], sum.flux[c])));
-        }
         in_flight = sum.power;
     }
     if (stage.offset.x != 0)

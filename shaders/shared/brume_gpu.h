@@ -29,6 +29,7 @@ typedef struct mat4 { float m[16]; } mat4;
 /* Uniform blocks */
 #define SLOT_FRAME 0
 #define SLOT_STAGE 1
+#define SLOT_LEVEL 2
 
 /* Storage buffers */
 #define SLOT_LIGHTS 0
@@ -111,6 +112,9 @@ typedef struct mat4 { float m[16]; } mat4;
 
 /* Samples of a lamp with extent whose transmittances are averaged, two by two in a texture. */
 #define EXTENDED_SAMPLES 4
+
+/* Lattices of light scattered or reflected, one within another, at most. */
+#define FIELD_LEVELS 3
 
 /* Lights, numbered as brume_light_type of brume.h; the world is one more. */
 #define LIGHT_SUN 0
@@ -220,6 +224,19 @@ struct gpu_depth_source {
 #define PASS_VOLUME_INDIRECT 7
 #define PASS_COUNT 8
 
+/* A lattice of light scattered or reflected: the whole, or one within the last with half its cells'
+ * sides. */
+struct gpu_field {
+    vec4 lower;          /* w: cell, m */
+    ivec4 dims;          /* cells along the sides; w: its first layer in the texture of all */
+    vec4 keep_lower;     /* where it gives way to the one around it; far off where both end. w: its
+                            number */
+    vec4 keep_upper;
+};
+#ifndef GL_core_profile
+typedef struct gpu_field gpu_field;
+#endif
+
 struct gpu_frame {
     vec4 ray_origin, ray_origin_x, ray_origin_y; /* ray = origin + x ndc.x + y ndc.y */
     vec4 ray_direction, ray_direction_x, ray_direction_y; /* view depth 1 per unit */
@@ -230,8 +247,8 @@ struct gpu_frame {
     ivec4 medium_dims;   /* w: 1 if there is one */
     vec4 lattice_lower;  /* transport lattice; w: cell, m */
     ivec4 lattice_dims;  /* nodes along the sides; w: 1 if there is one */
-    vec4 field_lower;    /* lattice of light scattered or reflected; w: cell, m */
-    ivec4 field_dims;    /* cells along the sides; w: 1 if there is one */
+    gpu_field fields[FIELD_LEVELS];
+    ivec4 field;         /* x: how many of these there are */
     vec4 sky_lower;      /* lattice of the world's light; w: cell, m */
     ivec4 sky_dims;      /* nodes along the sides; w: 1 if there is one */
     vec4 fog_lower;      /* the world's medium; w: 1 if there is one */

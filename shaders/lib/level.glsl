@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The lattice that is being filled with light, one of the frame's.
+#include "lib/links.glsl"
+
+layout(std140, binding = SLOT_LEVEL) uniform level_block
+{
+    gpu_field level;
+};
+
+bool in_level(ivec3 cell)
+{
+    return in_field(level, cell);
+}
+
+// Where a cell stands in a picture of a lattice with its layers as tiles, so many in a row.
+ivec2 tiled_texel(ivec3 cell, ivec3 dims, int row)
+{
+    return ivec2(cell.z % row, cell.z / row) * dims.xy + cell.xy;
+}
+
+// The same in clip space.
+vec4 tiled_position(ivec3 cell, ivec3 dims, int row)
+{
+    vec2 place = vec2(tiled_texel(cell, dims, row)) + 0.5;
+    return vec4(place / vec2(dims.xy * ivec2(row, (dims.z + row - 1) / row)) * 2.0 - 1.0, 0.5, 1.0);
+}
+
+// The picture of cut links knows the cells around the lattice, too: links from there lead into it.
+bool in_links(ivec3 cell)
+{
+    return all(greaterThanEqual(cell, ivec3(-1))) &&
+           all(lessThanEqual(cell, level.dims.xyz));
+}
+
+ivec3 links_texel(ivec3 cell)
+{
+    return cell + 1;
+}

@@ -72,7 +72,7 @@ const char *brume_field_part_name(uint32_t part)
 {
     static const char *const names[BRUME_FIELD_PARTS] = {
         "surfaces", "media", "reflected", "scattered", "blockers",
-        "aggregate", "prepare", "inflow", "iterations", "copy"};
+        "aggregate", "prepare", "iterations", "copy"};
     return part < BRUME_FIELD_PARTS ? names[part] : "";
 }
 

@@ -547,10 +547,9 @@ typedef enum brume_field_part {
     BRUME_FIELD_BLOCKERS = 4,        /* fuzzy ones: injection, */
     BRUME_FIELD_AGGREGATE = 5,       /* the greatest of all maps, */
     BRUME_FIELD_PREPARE = 6,         /* and factors of links */
-    BRUME_FIELD_INFLOW = 7,          /* into a lattice from the one around it */
-    BRUME_FIELD_ITERATIONS = 8,
-    BRUME_FIELD_COPY = 9,            /* into the lattice that the view looks up */
-    BRUME_FIELD_PARTS = 10
+    BRUME_FIELD_ITERATIONS = 7,
+    BRUME_FIELD_COPY = 8,            /* into the lattice that the view looks up */
+    BRUME_FIELD_PARTS = 9
 } brume_field_part;
 
 BRUME_API const char *brume_field_part_name(uint32_t part);
@@ -573,11 +572,12 @@ typedef struct brume_stats {
     uint32_t shadow_maps_drawn;  /* by this job, as the two below: what did not change stays */
     uint32_t lights_propagated;  /* lamps whose light was carried through the medium anew */
     uint32_t sky_propagated;     /* how often the world's was */
-    uint32_t iterations;         /* of scattered and reflected light, by this job */
+    uint32_t iterations;         /* of scattered and reflected light, by this job: of the whole, each
+                                    two of a lattice in it */
     double power_begun;          /* W of all colours: what these began with in the whole lattice, */
     double power_in_flight;      /* and what the last one left there that had not left it or been
                                     absorbed */
-    double field_ms[10];         /* by the GL's timer: brume_field_part */
+    double field_ms[9];          /* by the GL's timer: brume_field_part */
 } brume_stats;
 
 typedef struct brume_job brume_job;

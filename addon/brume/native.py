@@ -36,6 +36,7 @@ METHODS = {"OPV": 0, "LPV": 1}
 LIGHT_PATHS = {"ALL": 0, "DIRECT": 1, "REFLECTED": 2, "SINGLE": 3, "REFLECTED_MARCHED": 4,
                "SUM": 5}
 BLOCKERS = {"LINKS": 0, "FUZZY": 1}
+FOCUS = {"MEDIUM": 0, "CAMERA": 1}
 DEPTHS = {"PROPAGATED": 0, "MARCHED": 1, "CORRECTED": 2, "PAPER": 3, "ITERATED": 4}
 KINDS = {"mesh": 0, "instances": 1, "material": 2, "image": 3, "light": 4, "volume": 5}
 JOB_QUEUED, JOB_RUNNING, JOB_DONE, JOB_FAILED, JOB_CANCELLED = range(5)
@@ -186,7 +187,7 @@ class Stats(Structure):
                 ("samples", c_uint32), ("shadow_maps_drawn", c_uint32),
                 ("lights_propagated", c_uint32), ("sky_propagated", c_uint32),
                 ("iterations", c_uint32), ("power_begun", c_double),
-                ("power_in_flight", c_double), ("field_ms", c_double * 10)]
+                ("power_in_flight", c_double), ("field_ms", c_double * 9)]
 
 
 class JobStatus(Structure):

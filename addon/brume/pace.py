@@ -166,6 +166,7 @@ class SceneQuality:
                                                  _COARSEST_SHADOW)
             settings.light_samples = _halved(settings.light_samples, level, 1)
             settings.world_samples = _halved(settings.world_samples, level, _FEWEST_DIRECTIONS)
+            settings.cascades = max(settings.cascades - level, 1)
             if settings.iterations:
                 settings.iterations = _halved(settings.iterations, level, 1)
         if self.medium_level:

@@ -82,7 +82,7 @@ class BRUME_PT_single_scattering(_Rows, _RenderPanel, bpy.types.Panel):
 class BRUME_PT_light_propagation(_Rows, _RenderPanel, bpy.types.Panel):
     bl_label = "Light Propagation"
     bl_parent_id = "BRUME_PT_volumes"
-    rows = ("field_resolution", "iterations")
+    rows = ("field_resolution", "iterations", "cascades", "cascade_focus")
 
     @classmethod
     def applies(cls, context):

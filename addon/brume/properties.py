@@ -89,6 +89,18 @@ class BrumeSettings(bpy.types.PropertyGroup):
                     "light goes on. It is soft: fewer do than for the lights' own. More tell "
                     "smaller rooms and thicker smoke apart; memory grows with the third power, "
                     "time with the fourth where iterations go on until they converged")
+    cascades: IntProperty(
+        name="Cascades", update=changed, default=1, min=1, max=3,
+        description="Lattices of scattered and reflected light, each within the last and half as "
+                    "long, with as many cells: finer where it counts, without a finer whole. Each "
+                    "takes about as long as the first, and a fifth of its memory")
+    cascade_focus: EnumProperty(
+        name="Finer Around", update=changed, default='MEDIUM',
+        description="What the cascades after the first surround",
+        items=[('MEDIUM', "Volumes", "The middle of the volumes. Without any, what is near the "
+                                     "camera", 0),
+               ('CAMERA', "Camera", "What is near the camera, before it. Light is found anew there "
+                                    "when it has moved far", 1)])
     depths: EnumProperty(
         name="Optical Depths", update=changed, default='PROPAGATED',
         description="How it is found what the volumes let through between each lamp and each cell",
@@ -236,7 +248,9 @@ def native_settings(settings):
         method=native.METHODS[settings.method],
         medium_resolution=settings.medium_resolution,
         lattice_resolution=settings.lattice_resolution,
-        field_resolution=settings.field_resolution, iterations=settings.iterations,
+        field_resolution=settings.field_resolution,
+        cascades=settings.cascades, cascade_focus=native.FOCUS[settings.cascade_focus],
+        iterations=settings.iterations,
         shadow_resolution=settings.shadow_resolution, light_samples=settings.light_samples,
         world_samples=settings.world_samples, step=settings.step,
         depths=native.DEPTHS[settings.depths],

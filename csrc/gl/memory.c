@@ -76,6 +76,7 @@ static uint64_t texel_bytes(GLenum format)
         return 8;
     case GL_R32F:
     case GL_R32UI:
+    case GL_RGBA8UI:
     case GL_DEPTH_COMPONENT32F:
         return 4;
     case GL_R16F:
@@ -99,7 +100,8 @@ brume_result texture_init(struct memory *memory, struct texture *texture, enum p
                           int levels, const char *label)
 {
     /* Which are fetched, never filtered. */
-    const int integers = format == GL_R32UI || format == GL_RGBA32UI;
+    const int integers = format == GL_R32UI || format == GL_RGBA8UI ||
+                         format == GL_RGBA32UI;
     memset(texture, 0, sizeof *texture);
     while (glGetError() != GL_NO_ERROR)
         ;

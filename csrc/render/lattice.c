@@ -172,23 +172,15 @@ int lattice_wants_field(const brume_settings *settings)
            settings->light_paths != BRUME_PATHS_SINGLE;
 }
 
-static uint64_t field_working_bytes(const brume_settings *settings)
+static uint64_t field_bytes(const brume_settings *settings, const struct gpu_field *fields)
 {
-    return FIELD_WORKING_BYTES +
-           (settings->blockers == BRUME_BLOCKERS_FUZZY ? FIELD_FUZZY_BYTES : 0);
-}
-
-static uint64_t field_bytes(const brume_settings *settings, const struct gpu_field *fields,
-                            int levels)
-{
-    uint64_t all = 0, most = 0;
-    for (int i = 0; i < levels; ++i) {
-        const ivec4 dims = fields[i].dims;
-        const uint64_t cells = (uint64_t)dims.x * (uint64_t)dims.y * (uint64_t)dims.z;
-        all += cells;
-        most = cells > most ? cells : most;
-    }
-    return all * FIELD_CELL_BYTES + most * field_working_bytes(settings) + FIELD_FIXED_BYTES;
+    const uint64_t each = FIELD_CELL_BYTES + FIELD_WORKING_BYTES +
+                          (settings->blockers == BRUME_BLOCKERS_FUZZY ? FIELD_FUZZY_BYTES : 0);
+    uint64_t cells = 0;
+    for (int i = 0; i < settings->cascades; ++i)
+        cells += (uint64_t)fields[i].dims.x * (uint64_t)fields[i].dims.y *
+                 (uint64_t)fields[i].dims.z;
+    return cells * each + FIELD_FIXED_BYTES;
 }
 
 static void box_grow(struct box *box, float margin)
@@ -317,7 +309,7 @@ static int layout_field(struct renderer *renderer, const struct render_request *
             focus_of(renderer, request, 0.5f * longest(&around), focus);
             frame->fields[i] = field_within(&frame->fields[i - 1], focus);
         }
-        if (field_bytes(settings, frame->fields, settings->cascades) <= renderer->shares.field ||
+        if (field_bytes(settings, frame->fields) <= renderer->shares.field ||
             resolution <= 4)
             return resolution;
     }

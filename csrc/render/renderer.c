@@ -24,7 +24,6 @@ struct run {
     struct gpu *gpu;
     struct renderer *renderer;
     struct render_request *request;
-    uint64_t field_inputs; /* signature of what light that goes on depends on, but for its lattices */
 };
 
 /* --- Signatures: what a stage depends on -------------------------------------------------- */
@@ -221,7 +220,6 @@ static brume_result work_transport(struct run *run)
         .light_count = renderer->shadows.light_count,
         .medium_revision = renderer->stages[BRUME_STAGE_MEDIUM].revision,
         .world_signature = renderer->shadows.world_signature,
-        .signature = run->field_inputs,
         .world_first = renderer->shadows.world_first,
         .world_count = renderer->shadows.world_count,
         .stats = &request->stats,
@@ -515,12 +513,10 @@ static brume_result run_stages(struct run *run)
                                   (uint64_t)settings->field_resolution,
                                   settings->light_paths == BRUME_PATHS_ALL,
                                   settings->blockers,
-                                  float_bits(snapshot->world.reach)};
-    run->field_inputs = signature(transport, sizeof transport / sizeof *transport);
-    const uint64_t lattices[] = {
-        run->field_inputs,
-        hash_bytes(HASH_START, renderer->frame.fields, sizeof renderer->frame.fields)};
-    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, lattices, 2, work_transport));
+                                  float_bits(snapshot->world.reach),
+                                  hash_bytes(HASH_START, renderer->frame.fields,
+                                             sizeof renderer->frame.fields)};
+    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 13, work_transport));
     collect_warnings(run);
     return BRUME_OK;
 }
@@ -528,7 +524,7 @@ static brume_result run_stages(struct run *run)
 brume_result renderer_step(struct gpu *gpu, struct renderer *renderer,
                            struct render_request *request, bool *more)
 {
-    struct run run = {gpu, renderer, request, 0};
+    struct run run = {gpu, renderer, request};
     const double started = clock_ms();
     *more = false;
     brume_result result = BRUME_OK;

@@ -2,14 +2,12 @@
 /* LPV: multiple scattering by light carried from cell to cell, after "Light Propagation Volumes
  * with scattering"; docs/methods/lpv.md. Single scattering is OPV's. */
 #include "transport/lpv.h"
-#include "base/hash.h"
 #include "base/result.h"
 #include "gl/timer.h"
 #include "transport/method.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #define MOST_ITERATIONS 2000
 #define ITERATIONS_A_LOOK 4
@@ -43,7 +41,6 @@ static brume_result make(struct lpv_work *work)
     const ivec4 dims = work->field->dims;
     TRY(buffer_init(&work->input->gpu->memory, &work->level, FOR_TRANSPORT, sizeof *work->field,
                     work->field, "lattice"));
-    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL, work->level.id);
     static const char *const labels[] = {"cells' extinction", "cells' albedo", "cells' surfaces"};
     work->tiles = (int)ceil(sqrt((double)dims.z));
     const int rows = lpv_tile_rows(&dims, work->tiles);
@@ -58,10 +55,13 @@ static brume_result make(struct lpv_work *work)
     }
     TRY(buffer_init(&work->input->gpu->memory, &work->powers, FOR_TRANSPORT,
                     group_count(&dims) * sizeof(float), NULL, "powers in flight"));
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_POWERS, work->powers.id);
     TRY(texture_init(&work->input->gpu->memory, &work->links, FOR_TRANSPORT, GL_TEXTURE_3D,
                      GL_R32UI, texture_side(dims.x + 2), texture_side(dims.y + 2),
                      texture_side(dims.z + 2), 1, "cut links")); /* of the cells around, too */
+    if (work->around)
+        TRY(texture_init(&work->input->gpu->memory, &work->cells_around, FOR_TRANSPORT,
+                         GL_TEXTURE_3D, GL_RGBA8UI, texture_side(dims.x + 2),
+                         texture_side(dims.y + 2), texture_side(dims.z + 2), 1, "cells around"));
     return lattice_texture(work, &work->walls, GL_R32UI, WALL_TEXELS, "surfaces' reflectances");
 }
 
@@ -76,6 +76,7 @@ static void finish(struct lpv_work *work)
         texture_finish(memory, &work->reflected[c]);
     }
     texture_finish(memory, &work->links);
+    texture_finish(memory, &work->cells_around);
     texture_finish(memory, &work->walls);
     lpv_fuzzy_finish(work);
     buffer_finish(memory, &work->powers);
@@ -140,35 +141,23 @@ static brume_result in_flight(struct lpv_work *work, double *power)
     return BRUME_OK;
 }
 
-/* What the lattice around this one sends into it, once that one's field is known. */
-static brume_result flow_in(struct lpv_work *work)
+static void bind_level(const struct lpv_work *work)
 {
-    laps_go(work->laps, BRUME_FIELD_INFLOW);
-    bind_images(SLOT_OUTPUT, work->reflected, GL_READ_WRITE, GL_RGBA32F);
-    TRY(over_field(work, "lpv_inflow", (ivec4){work->number, work->tiles, 0, 0}));
-    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
-    return BRUME_OK;
+    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL, work->level.id);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_POWERS, work->powers.id);
 }
 
 static brume_result begin(struct lpv_work *work)
 {
     static const float nothing[4];
-    double begun = 0.0;
-    for (int c = 0; c < 3; ++c)
-        glClearTexImage(work->sums[c].id, 0, GL_RGBA, GL_FLOAT, nothing);
-    bind_images(SLOT_OUTPUT_FIELD, work->sums, GL_READ_WRITE, GL_RGBA32F);
-    glBindTextureUnit(SLOT_CELL_EXTINCT, work->cells[0].id);
-    glBindTextureUnit(SLOT_CELL_ALBEDO, work->cells[1].id);
-    glBindTextureUnit(SLOT_LINKS, work->links.id);
-    if (work->number > 0)
-        TRY(flow_in(work));
     laps_go(work->laps, BRUME_FIELD_SCATTERED);
     bind_textures(SLOT_REFLECTED, work->reflected);
     bind_images(SLOT_OUTPUT, work->flow[0], GL_WRITE_ONLY, GL_RGBA32F);
     TRY(over_field(work, "lpv_scatter", (ivec4){with_media(work), work->tiles, 0, 0}));
-    TRY(in_flight(work, &begun));
-    if (work->number == 0)
-        work->input->stats->power_begun = begun;
+    if (!work->around)
+        TRY(in_flight(work, &work->input->stats->power_begun));
+    for (int c = 0; c < 3; ++c)
+        glClearTexImage(work->sums[c].id, 0, GL_RGBA, GL_FLOAT, nothing);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     return BRUME_OK;
 }
@@ -201,73 +190,105 @@ static bool settled(struct series *so_far, double power)
 
 /* `counts`: what this iteration's light counts in the field. Into *power what is in flight after it,
  * unless that is NULL: to look takes time. */
-static brume_result iterate(struct lpv_work *work, int number, double counts, double *power)
+static brume_result iterate(struct lpv_work *work, double counts, double *power)
 {
     const union {
         float value;
         int bits;
     } times = {(float)counts};
-    /* Of iterations until it converged nobody knows how many there will be. */
-    const int wanted = work->input->settings->iterations;
-    const int all = wanted > 0 ? wanted : number + USUAL_ITERATIONS;
-    const int levels = work->input->frame->field.x;
-    work->passes.done =
-        1.0f + 0.5f * ((float)work->number + (float)number / (float)all) / (float)levels;
-    bind_textures(SLOT_FLOW, work->flow[number % 2]);
-    bind_images(SLOT_OUTPUT, work->flow[(number + 1) % 2], GL_WRITE_ONLY, GL_RGBA32F);
+    const struct lpv_work *around = work->around;
+    const int now = work->iterations % 2;
+    bind_level(work);
+    bind_textures(SLOT_FLOW, work->flow[now]);
+    glBindTextureUnit(SLOT_CELL_EXTINCT, work->cells[0].id);
+    glBindTextureUnit(SLOT_CELL_ALBEDO, work->cells[1].id);
+    glBindTextureUnit(SLOT_WALLS, work->cells[2].id);
+    glBindTextureUnit(SLOT_LINKS, work->links.id);
+    glBindTextureUnit(SLOT_BLOCKED, work->fuzzy.factors.id);
+    if (around) { /* what it began its own iteration with, which has just ended */
+        bind_textures(SLOT_FLOW_AROUND, around->flow[(around->iterations - 1) % 2]);
+        glBindTextureUnit(SLOT_AROUND, work->cells_around.id);
+    }
+    bind_images(SLOT_OUTPUT, work->flow[!now], GL_WRITE_ONLY, GL_RGBA32F);
+    bind_images(SLOT_OUTPUT_FIELD, work->sums, GL_READ_WRITE, GL_RGBA32F);
     TRY(over_field(work, lpv_is_fuzzy(work) ? "lpv_propagate_fuzzy" : "lpv_propagate",
-                     (ivec4){power != NULL, times.bits, 0, 0}));
+                   (ivec4){power != NULL, times.bits, around != NULL, 0}));
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
-    ++work->input->stats->iterations;
+    ++work->iterations;
     return power ? in_flight(work, power) : BRUME_OK;
 }
 
-/* Into *power what is left in flight at the end. */
-static brume_result go_on(struct lpv_work *work, double *power)
+/* One iteration of a lattice, and two of the one within it, whose cells are half as long. */
+static brume_result step(struct lpv_work *work, double counts, double *power)
 {
+    TRY(iterate(work, counts, power));
+    for (int i = 0; work->within && i < 2; ++i)
+        TRY(step(work->within, counts, NULL));
+    return BRUME_OK;
+}
+
+/* Of the whole lattice, with all in it. */
+static brume_result propagate(struct lpv_work *work)
+{
+    brume_stats *stats = work->input->stats;
     const int wanted = work->input->settings->iterations;
     const int most = wanted > 0 ? wanted : MOST_ITERATIONS;
     struct series so_far = {0};
+    double counts = 1.0;
     for (int i = 0; i < most; ++i) {
-        const bool look = i % ITERATIONS_A_LOOK == ITERATIONS_A_LOOK - 1 || i == most - 1;
-        TRY(iterate(work, i, 1.0, look ? power : NULL));
-        if (look && wanted <= 0 && settled(&so_far, *power))
-            /* The next iteration stands for all that would follow. */
-            return so_far.power > 0.0 ? iterate(work, i + 1, 1.0 / (1.0 - so_far.ratio), power)
-                                      : BRUME_OK;
+        const bool look = i % ITERATIONS_A_LOOK == ITERATIONS_A_LOOK - 1 || i == most - 1 ||
+                          counts != 1.0;
+        /* Of iterations until it converged nobody knows how many there will be. */
+        work->passes.done =
+            1.0f + 0.5f * (float)i / (float)(wanted > 0 ? wanted : i + USUAL_ITERATIONS);
+        TRY(step(work, counts, look ? &stats->power_in_flight : NULL));
+        ++stats->iterations;
+        if (counts != 1.0)
+            break;
+        if (look && wanted <= 0 && settled(&so_far, stats->power_in_flight)) {
+            if (!(so_far.power > 0.0))
+                break;
+            counts = 1.0 / (1.0 - so_far.ratio); /* the next one stands for all that would follow */
+        }
     }
     return BRUME_OK;
 }
 
-static brume_result propagate(struct lpv_work *work)
-{
-    double power = 0.0;
-    glBindTextureUnit(SLOT_WALLS, work->cells[2].id);
-    glBindTextureUnit(SLOT_BLOCKED, work->fuzzy.factors.id);
-    TRY(go_on(work, &power));
-    if (work->number == 0)
-        work->input->stats->power_in_flight = power;
-    return BRUME_OK;
-}
-
-static brume_result hand_over(struct lpv_work *work, struct transport *transport)
+static brume_result hand_over(const struct lpv_work *work)
 {
     const ivec4 dims = work->field->dims;
     const struct program *program;
     laps_go(work->laps, BRUME_FIELD_COPY);
     TRY(program_compute(&work->input->gpu->programs, "lpv_finish", &program));
+    bind_level(work);
     bind_textures(SLOT_FLOW, work->sums);
     glBindTextureUnit(SLOT_LINKS, work->links.id);
     glBindTextureUnit(SLOT_WALLS, work->walls.id);
-    glBindImageTexture(SLOT_OUTPUT, transport->field.id, 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+    glBindImageTexture(SLOT_OUTPUT, work->product->id, 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA32F);
     program_dispatch(program, dims.x, dims.y, dims.z);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     return BRUME_OK;
 }
 
-static brume_result find(struct lpv_work *work, struct transport *transport)
+/* Which cells of the lattice around this one lie beyond its sides. */
+static brume_result look_around(struct lpv_work *work)
+{
+    const ivec4 dims = work->field->dims, more = {dims.x + 2, dims.y + 2, dims.z + 2, 0};
+    TRY(hand_over(work->around)); /* tells which side of surfaces its cells are on, so far */
+    laps_go(work->laps, BRUME_FIELD_PREPARE);
+    bind_level(work);
+    glBindImageTexture(SLOT_OUTPUT, work->cells_around.id, 0, GL_TRUE, 0, GL_WRITE_ONLY,
+                       GL_RGBA8UI);
+    TRY(lpv_over_lattice(work, "lpv_around", (ivec4){work->around->number, 0, 0, 0}, &more));
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    return BRUME_OK;
+}
+
+/* All that iterations need. */
+static brume_result prepare(struct lpv_work *work)
 {
     TRY(make(work));
+    bind_level(work);
     laps_go(work->laps, BRUME_FIELD_SURFACES);
     TRY(lpv_cut_links(work));
     laps_go(work->laps, BRUME_FIELD_MEDIUM);
@@ -279,16 +300,24 @@ static brume_result find(struct lpv_work *work, struct transport *transport)
     if (lpv_is_fuzzy(work))
         TRY(lpv_fuzzy_prepare(work));
     TRY(begin(work));
-    laps_go(work->laps, BRUME_FIELD_ITERATIONS);
-    TRY(propagate(work));
-    return hand_over(work, transport);
+    return work->around ? look_around(work) : BRUME_OK;
 }
 
-/* The texture of all lattices, one above the other. What it held is lost when its size changes. */
-static brume_result make_field(struct transport *transport, const struct transport_input *input)
+static brume_result find(struct lpv_work *works, int levels)
+{
+    for (int i = 0; i < levels; ++i)
+        TRY(prepare(&works[i]));
+    laps_go(works->laps, BRUME_FIELD_ITERATIONS);
+    TRY(propagate(works));
+    for (int i = 0; i < levels; ++i)
+        TRY(hand_over(&works[i]));
+    return BRUME_OK;
+}
+
+/* The texture of all lattices, one above the other. */
+static brume_result make_product(struct texture *product, const struct transport_input *input)
 {
     const struct gpu_frame *frame = input->frame;
-    struct texture *field = &transport->field;
     int size[3] = {0};
     for (int i = 0; i < frame->field.x; ++i) {
         const ivec4 dims = frame->fields[i].dims;
@@ -296,49 +325,35 @@ static brume_result make_field(struct transport *transport, const struct transpo
         size[1] = dims.y > size[1] ? dims.y : size[1];
         size[2] = dims.w + dims.z;
     }
-    const int width = texture_side(4 * size[0]), height = texture_side(size[1]),
-              depth = texture_side(size[2]);
-    if (!field->id || field->width != width || field->height != height || field->depth != depth)
-        memset(transport->field_signatures, 0, sizeof transport->field_signatures);
-    return texture_ensure(&input->gpu->memory, field, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA32F,
-                          width, height, depth, 1, "field");
-}
-
-static brume_result one_level(struct transport *transport, const struct transport_input *input,
-                              int number, struct laps *laps)
-{
-    struct lpv_work work = {
-        .input = input,
-        .field = &input->frame->fields[number],
-        .number = number,
-        .laps = laps,
-        .passes = {.input = input, .done = 1.0f}, /* after the depths */
-    };
-    const brume_result result = find(&work, transport);
-    finish(&work);
-    return result;
+    return texture_ensure(&input->gpu->memory, product, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA32F,
+                          texture_side(4 * size[0]), texture_side(size[1]), texture_side(size[2]),
+                          1, "field");
 }
 
 brume_result lpv_run(struct transport *transport, const struct transport_input *input)
 {
     TRY(opv_run(transport, input));
-    const struct gpu_frame *frame = input->frame;
-    if (!frame->field.x)
+    const int levels = input->frame->field.x;
+    if (!levels)
         return BRUME_OK;
-    TRY(make_field(transport, input));
+    TRY(make_product(&transport->field, input));
     transport_bind(transport); /* depths and sky, as OPV has just found them */
     struct laps laps = {.sums_ms = input->stats->field_ms};
-    uint64_t wanted = input->signature;
-    brume_result result = BRUME_OK;
-    for (int i = 0; i < frame->field.x && result == BRUME_OK; ++i) {
-        wanted = hash_bytes(wanted, &frame->fields[i], sizeof frame->fields[i]);
-        if (transport->field_signatures[i] == wanted)
-            continue; /* nor has what is around it changed */
-        transport->field_signatures[i] = 0;
-        result = one_level(transport, input, i, &laps);
-        if (result == BRUME_OK)
-            transport->field_signatures[i] = wanted;
-    }
+    struct lpv_work works[FIELD_LEVELS] = {0};
+    for (int i = 0; i < levels; ++i)
+        works[i] = (struct lpv_work){
+            .input = input,
+            .field = &input->frame->fields[i],
+            .number = i,
+            .around = i ? &works[i - 1] : NULL,
+            .within = i + 1 < levels ? &works[i + 1] : NULL,
+            .product = &transport->field,
+            .laps = &laps,
+            .passes = {.input = input, .done = 1.0f}, /* after the depths */
+        };
+    const brume_result result = find(works, levels);
+    for (int i = 0; i < levels; ++i)
+        finish(&works[i]);
     laps_end(&laps);
     return result;
 }

@@ -7,7 +7,7 @@
 
 /* Bytes of a cell: of the field, and of what is needed while it is found. */
 #define FIELD_CELL_BYTES 64
-#define FIELD_WORKING_BYTES 252 /* of the largest; and one layer more of what is cut */
+#define FIELD_WORKING_BYTES 256 /* and one layer more of what is cut */
 #define FIELD_FUZZY_BYTES 96 /* the same, for fuzzy blockers, and one layer more of their lattice */
 /* Beside the lattice: reflective shadow maps, and blocks. */
 #define FIELD_FIXED_BYTES (3u << 20)
@@ -29,10 +29,14 @@ struct lpv_work {
     const struct gpu_field *field;  /* the lattice, of the frame */
     int number;                     /* of it there: 0 the whole */
     struct buffer level;            /* the same for shaders */
+    struct lpv_work *around, *within; /* those of the lattices next to it, or NULL */
+    const struct texture *product;  /* where the light of all lattices goes in the end */
+    int iterations;                 /* so far */
     struct opv_work passes;         /* the block of lattice passes, and how far it is */
     struct texture flow[2][3];      /* light in flight, before and after an iteration */
     struct texture sums[3];         /* what has passed through a cell: the field */
     struct texture cells[3];        /* extinction, albedo, reflectance of the surfaces in it */
+    struct texture cells_around;    /* of the lattice around it, by the cells beyond its sides */
     struct texture links, walls;    /* links that surfaces cut; sums of their reflectances */
     struct texture reflected[3];    /* what surfaces reflect first, the lattice's layers as tiles */
     int tiles;                      /* of these in a row */

@@ -16,8 +16,8 @@ struct transport {
     struct texture tau;    /* optical depth to each light over the length of the way, a tile a light */
     struct texture sky[3]; /* the world's light, spherical harmonics a colour */
     struct texture field;  /* light scattered or reflected before, as lpv_finish leaves it */
-    /* Signatures of what a light's tile, the sky and a lattice of the field hold, 0: nothing of use. */
-    uint64_t *tau_signatures, sky_signature, field_signatures[FIELD_LEVELS];
+    /* Signatures of what a light's tile and the sky hold, 0: nothing of use. */
+    uint64_t *tau_signatures, sky_signature;
     uint32_t tau_count;
 };
 
@@ -33,7 +33,6 @@ struct transport_input {
     uint32_t light_count;
     uint64_t medium_revision;
     uint64_t world_signature;       /* of the world's samples and shadow maps */
-    uint64_t signature;             /* of all that the field is made from, but for its lattices */
     brume_stats *stats;             /* counts what is propagated */
     uint32_t world_first, world_count; /* samples */
     int tau_size[3];                /* texels of the optical depths' texture, 0: none wanted */

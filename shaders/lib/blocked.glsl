@@ -5,5 +5,5 @@
 struct link_blockers
 {
     float there; // of what the cell sends
-    float back;  // of what comes to it; 1 where nothing can
+    float back;  // of what comes to it
 };

@@ -21,11 +21,12 @@ float factor(uvec4 factors, int i)
     return float(factors[i >> 2] >> (8 * (i & 3)) & 255u) * (1.0 / 255.0);
 }
 
-// Of the cell's link with that number to its neighbour, if that is there.
+// Of the cell's link with that number to its neighbour; `there`: that is in the lattice. Factors of
+// what lies around it nobody knows.
 link_blockers blockers_between(cell_blockers own, ivec3 beyond, int number, bool there)
 {
     int i = number % 13, opposite = number < 13 ? 1 : 0;
     ivec3 texel = ivec3(2 * beyond.x + opposite, beyond.yz);
-    return link_blockers(factor(own.factors[1 - opposite], i),
-                         there ? factor(texelFetch(blocked_factors, texel, 0), i) : 1.0);
+    float share = factor(own.factors[1 - opposite], i);
+    return link_blockers(share, there ? factor(texelFetch(blocked_factors, texel, 0), i) : share);
 }

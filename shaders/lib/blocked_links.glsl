@@ -14,11 +14,11 @@ cell_blockers blockers_of(ivec3 cell)
     return cell_blockers(texelFetch(links, links_texel(cell), 0).r);
 }
 
-// Of the cell's link with that number to its neighbour, if that is there.
+// Of the cell's link with that number to its neighbour; `there`: that is in the lattice.
 link_blockers blockers_between(cell_blockers own, ivec3 beyond, int number, bool there)
 {
     int i = number % 13;
     uint cut = (number < 13 ? own.cut : texelFetch(links, links_texel(beyond), 0).r) >> i;
     float share = float(cut & 1u);
-    return link_blockers(share, there ? share : 1.0);
+    return link_blockers(share, share);
 }

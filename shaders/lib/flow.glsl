@@ -13,10 +13,6 @@
 const float LEAST_WIDTH = 0.38;
 const float MEAN_HOP = 1.25; // cells
 
-// Of what leaves a cell alike to all sides, the way in its cell and the next: sum of WEIGHTS times
-// lengths, in cells.
-const float MEAN_WAY = 1.3776;
-
 float leaving(vec4 lobe, int link_class_number, vec3 direction)
 {
     return WEIGHTS[link_class_number] * lobe.x * exp(dot(lobe.yzw, direction));

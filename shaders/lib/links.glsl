@@ -15,6 +15,9 @@ const vec3 ASIDE = vec3(ASIDE_X, ASIDE_Y, ASIDE_Z);
 // and the flux that it has.
 const float WEIGHTS[3] = float[](1.0 / 21.0, 4.0 / 105.0, 9.0 / 280.0);
 
+// The mean length of a link by these, in cells.
+const float MEAN_WAY = 1.3776;
+
 // 0 through a face, 1 an edge, 2 a corner.
 int link_class(int i)
 {

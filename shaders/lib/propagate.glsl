@@ -5,30 +5,77 @@
 // How much they block is told by one of lib/blocked_*.glsl, included before this: a switch between
 // them made an iteration a quarter longer.
 #include "lib/flow.glsl"
-#include "lib/gather.glsl"
+#include "lib/level.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
     gpu_lattice_pass stage; // offset.x: 1 sums what is in flight; y: a float: what the
-                            // light of this iteration counts in the field
+                            // light of this iteration counts in the field; z: 1: there is a
+                            // lattice around this one
 };
 
 layout(binding = SLOT_FLOW) uniform sampler3D flow_before[3];
+layout(binding = SLOT_FLOW_AROUND) uniform sampler3D flow_around[3];
+layout(binding = SLOT_AROUND) uniform usampler3D cells_around;
 layout(binding = SLOT_CELL_EXTINCT) uniform sampler3D cell_extinct;
 layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_albedo;
 layout(binding = SLOT_WALLS) uniform sampler3D cell_walls;
 
 layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D flow_image[3];
+layout(binding = SLOT_OUTPUT_FIELD, rgba32f) uniform image3D field_image[3];
 
 #include "lib/power.glsl"
 
-vec3 leave(ivec3 cell, int class_, vec3 direction)
+struct half_way
 {
-    return vec3(leaving(texelFetch(flow_before[0], cell, 0), class_, direction),
-                leaving(texelFetch(flow_before[1], cell, 0), class_, direction),
-                leaving(texelFetch(flow_before[2], cell, 0), class_, direction));
+    vec3 through; // what arrives at its end
+    vec3 mean;    // m; times the power at its begin: power times path
+};
+
+half_way fly(vec3 extinct, float way)
+{
+    half_way half_;
+    vec3 tau = extinct * way;
+    half_.through = exp(-tau);
+    half_.mean = mix((1.0 - half_.through) / max(extinct, vec3(1e-20)), way * (1.0 - 0.5 * tau),
+                     lessThan(tau, vec3(1e-3)));
+    return half_;
+}
+
+struct gathered
+{
+    vec3 power;   // that arrives in the cell's middle, or is scattered on its way
+    mat3 flux;    // columns: colours
+    vec3 passed;  // power times path
+    mat3 passed_flux;
+};
+
+void add_flux(inout mat3 flux, vec3 power, vec3 direction)
+{
+    for (int c = 0; c < 3; ++c)
+        flux[c] += power[c] * direction;
+}
+
+vec3 leave(sampler3D flow[3], ivec3 cell, int class_, vec3 direction)
+{
+    return vec3(leaving(texelFetch(flow[0], cell, 0), class_, direction),
+                leaving(texelFetch(flow[1], cell, 0), class_, direction),
+                leaving(texelFetch(flow[2], cell, 0), class_, direction));
+}
+
+// From a cell beyond the lattice, what the lattice around it knows. Each cell of that one is eight of
+// this one's, and an iteration of it two of this one's, so that light gets as far. What media scatter
+// in a cell leaves it once more: for the same light cells send the more the thicker they are, by the
+// share that the mean way through one dims.
+vec3 leave_around(ivec3 cell, int class_, vec3 direction, vec3 extinct)
+{
+    uvec4 around = texelFetch(cells_around, links_texel(cell), 0);
+    if (around.w == 0u)
+        return vec3(0.0);
+    vec3 dimmed = exp(-MEAN_WAY * level.lower.w * extinct);
+    return leave(flow_around, ivec3(around.xyz), class_, direction) * (1.0 + dimmed) * (1.0 / 16.0);
 }
 
 void main()
@@ -68,18 +115,29 @@ void main()
                 begins = out_ * mine.through * wall * shares.there;
                 lobes = begins * (2.0 / 3.0);
             }
-            if (shares.back < 1.0) {
-                vec3 comes = leave(beyond, class_, -direction) *
-                             fly(texelFetch(cell_extinct, beyond, 0).rgb, way).through *
-                             (1.0 - shares.back);
+            if (shares.back < 1.0 && (there || stage.offset.z != 0)) {
+                vec3 comes = 1.0 - vec3(shares.back);
+                if (there)
+                    comes *= leave(flow_before, beyond, class_, -direction) *
+                             fly(texelFetch(cell_extinct, beyond, 0).rgb, way).through;
+                else
+                    comes *= leave_around(beyond, class_, -direction, extinct) * mine.through;
                 begins += comes;
                 lobes += comes;
             }
-            arrive(sum, begins, lobes, mine, albedo, direction);
+            vec3 arrives = begins * mine.through;
+            sum.power += arrives + (begins - arrives) * albedo;
+            add_flux(sum.flux, lobes * mine.through, -direction);
+            sum.passed += begins * mine.mean;
+            add_flux(sum.passed_flux, lobes * mine.mean, -direction);
         }
-        count_passed(cell, sum, intBitsToFloat(stage.offset.y));
-        for (int c = 0; c < 3; ++c)
+        float counts = intBitsToFloat(stage.offset.y) / (side * side * side);
+        for (int c = 0; c < 3; ++c) {
+            vec4 field = imageLoad(field_image[c], cell);
+            field += vec4(sum.passed[c], sum.passed_flux[c]) * counts;
+            imageStore(field_image[c], cell, field);
             imageStore(flow_image[c], cell, lobe_of(vec4(sum.power[c], sum.flux[c])));
+        }
         in_flight = sum.power;
     }
     if (stage.offset.x != 0)

@@ -72,8 +72,10 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_AREAS 24        /* and one more: fuzzy blockers' */
 #define SLOT_REFLECTED 27    /* and two more */
 #define SLOT_RSM 27          /* and two more: position, normal, reflectance */
+#define SLOT_FLOW_AROUND 27  /* and two more: of the lattice around */
 #define SLOT_BLOCKED 30
 #define SLOT_HALF 31
+#define SLOT_AROUND 32       /* which cell of the lattice around a cell beyond this one is in */
 
 /* Images written by compute passes, and by the drawing of links */
 #define SLOT_OUTPUT 0
@@ -229,8 +231,7 @@ struct gpu_depth_source {
 struct gpu_field {
     vec4 lower;          /* w: cell, m */
     ivec4 dims;          /* cells along the sides; w: its first layer in the texture of all */
-    vec4 keep_lower;     /* where it gives way to the one around it; far off where both end. w: its
-                            number */
+    vec4 keep_lower;     /* where it gives way to the one around it; far off where both end */
     vec4 keep_upper;
 };
 #ifndef GL_core_profile

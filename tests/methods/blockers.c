@@ -113,18 +113,28 @@ static double light_at(brume_scene *scene, const brume_settings *settings, const
     return sum / (PIXELS * PIXELS);
 }
 
+/* Lattices that light goes on in. The inner ones end in the middle of the walls' and the fog's sides. */
+struct lattices {
+    const char *name;
+    int resolution, cascades;
+};
+
+static const struct lattices lattices[] = {
+    {"16³", 16, 1}, {"32³", 32, 1}, {"16³, two within", 16, 3}};
+
 /* Light behind the wall, by the light before it. */
-static double leak(const struct wall *wall, int resolution, uint32_t blockers, uint64_t lamps,
-                   double *lit)
+static double leak(const struct wall *wall, const struct lattices *in, uint32_t blockers,
+                   uint64_t lamps, double *lit)
 {
     const brume_settings settings = {.method = BRUME_METHOD_LPV,
                                      .medium_resolution = 64,
-                                     .lattice_resolution = resolution,
-                                     .field_resolution = resolution,
+                                     .lattice_resolution = in->resolution,
+                                     .field_resolution = in->resolution,
+                                     .cascades = in->cascades,
                                      .shadow_resolution = 128,
                                      .blockers = blockers};
     float n[2];
-    brume_scene *scene = parted_box(wall, resolution, lamps, n);
+    brume_scene *scene = parted_box(wall, in->resolution, lamps, n);
     *lit = light_at(scene, &settings, (float[3]){-BESIDE * n[0], -BESIDE * n[1], 0});
     const double dark = light_at(scene, &settings, (float[3]){BESIDE * n[0], BESIDE * n[1], 0});
     brume_scene_destroy(scene);
@@ -134,22 +144,23 @@ static double leak(const struct wall *wall, int resolution, uint32_t blockers, u
 static void through_a_wall(void **state)
 {
     (void)state;
-    static const int resolutions[] = {16, 32};
     printf("| wall | turned by | lattice | links | fuzzy | before it, of links' |\n"
            "|---|---|---|---|---|---|\n");
     for (size_t w = 0; w < sizeof walls / sizeof *walls; ++w)
-        for (int r = 0; r < 2; ++r) {
+        for (size_t r = 0; r < sizeof lattices / sizeof *lattices; ++r) {
             double lit, fuzzy_lit;
-            const double links = leak(&walls[w], resolutions[r], BRUME_BLOCKERS_LINKS, 1, &lit);
+            const double links = leak(&walls[w], &lattices[r], BRUME_BLOCKERS_LINKS, 1, &lit);
             const double fuzzy =
-                leak(&walls[w], resolutions[r], BRUME_BLOCKERS_FUZZY, 1, &fuzzy_lit);
-            printf("| %s | %g° | %d³ | %.1e | %.1f %% | %.0f %% |\n", walls[w].name,
-                   (double)walls[w].degrees, resolutions[r], links, 100.0 * fuzzy,
+                leak(&walls[w], &lattices[r], BRUME_BLOCKERS_FUZZY, 1, &fuzzy_lit);
+            printf("| %s | %g° | %s | %.1e | %.1f %% | %.0f %% |\n", walls[w].name,
+                   (double)walls[w].degrees, lattices[r].name, links, 100.0 * fuzzy,
                    100.0 * fuzzy_lit / lit);
             assert_true(lit > 0.0 && fuzzy_lit > 0.0);
             /* Nothing passes; but in a wedge's very tip a cell's centre may lie behind either
-             * wall, of what these reflect first. */
-            assert_true(links < (walls[w].degrees > 0 && !walls[w].cells ? 2e-4 : 1e-6));
+             * wall, of what these reflect first; and beyond an inner lattice's sides, of a wall
+             * askew, the side that a cell is on is not known exactly. */
+            const double limit = lattices[r].cascades > 1 ? 1e-3 : 2e-4;
+            assert_true(links < (walls[w].degrees > 0 && !walls[w].cells ? limit : 1e-6));
             assert_true(fuzzy > links && fuzzy < 1.0);
         }
 }
@@ -160,7 +171,7 @@ static void seen_by_several_lamps(void **state)
     (void)state;
     double lit[2], leaks[2];
     for (int i = 0; i < 2; ++i)
-        leaks[i] = leak(&walls[1], 16, BRUME_BLOCKERS_FUZZY, i ? 4 : 1, &lit[i]);
+        leaks[i] = leak(&walls[1], &lattices[0], BRUME_BLOCKERS_FUZZY, i ? 4 : 1, &lit[i]);
     printf("four lamps instead of one: %.2f %% of the light before the wall, %.2f of its leak\n",
            100.0 * lit[1] / lit[0], leaks[1] / leaks[0]);
     assert_close(lit[1], lit[0], 0.01);

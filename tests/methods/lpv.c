@@ -2,16 +2,9 @@
 /* LPV: that light in flight keeps its power, goes alike in all directions and adds up; that a
  * turned scene is a turned picture; that a white furnace is white; and that nothing becomes
  * negative or infinite whatever the scene is. */
-#include "gl/device.h"
-#include "harness.h"
-#include "render/job.h"
-
-#include <stdbool.h>
+#include "field.h"
 
 #define CELLS 32
-
-static const float origin[3];
-static const struct coefficients white_fog = {.sigma_s = {1.0f, 0.5f, 0.25f}};
 
 static brume_settings settings_for(int iterations)
 {
@@ -23,117 +16,6 @@ static brume_settings settings_for(int iterations)
                             .shadow_resolution = 64,
                             .light_samples = 1,
                             .world_samples = 64};
-}
-
-/* --- The field's lattice -------------------------------------------------------------------- */
-
-/* What the view takes light from: fluence and flux of a colour at a cell. */
-struct field {
-    brume_scene *scene;
-    int dims[3], width, height, depth;
-    float lower[3], cell;
-    float *texels;
-};
-
-static bool fetch(struct gpu *gpu, void *user)
-{
-    (void)gpu;
-    struct field *field = user;
-    const struct renderer *renderer = &field->scene->renderer;
-    const struct texture *texture = &renderer->transport.field;
-    memcpy(field->dims, &renderer->frame.field_dims, sizeof field->dims);
-    memcpy(field->lower, &renderer->frame.field_lower, sizeof field->lower);
-    field->cell = renderer->frame.field_lower.w;
-    field->width = texture->width;
-    field->height = texture->height;
-    field->depth = texture->depth;
-    const size_t count = 4 * (size_t)field->width * (size_t)field->height * (size_t)field->depth;
-    field->texels = malloc(count * sizeof *field->texels);
-    if (field->texels)
-        glGetTextureImage(texture->id, 0, GL_RGBA, GL_FLOAT, (GLsizei)(count * sizeof(float)),
-                          field->texels);
-    return false;
-}
-
-/* Renders and gives the field; free() its texels. */
-static struct field field_of(brume_scene *scene, const brume_settings *settings, brume_stats *stats)
-{
-    const brume_view view = orthographic_view(origin, (float[3]){0, 0, -1}, 0.1f, 5.0f, 4);
-    struct field field = {.scene = scene};
-    brume_job *job = render(scene, settings, &view);
-    if (stats)
-        assert_ok(brume_job_stats(job, stats));
-    brume_job_release(job);
-    device_call(device, fetch, &field);
-    assert_non_null(field.texels);
-    return field;
-}
-
-static const float *texel(const struct field *field, const int cell[3], int color)
-{
-    const size_t x = (size_t)(cell[0] + color * field->dims[0]);
-    return field->texels +
-           4 * (x +
-                (size_t)field->width * ((size_t)cell[1] + (size_t)field->height * (size_t)cell[2]));
-}
-
-static double fluence(const struct field *field, const int cell[3], int color)
-{
-    return texel(field, cell, color)[0];
-}
-
-static void assert_sound(const struct field *field)
-{
-    int cell[3];
-    for (cell[2] = 0; cell[2] < field->dims[2]; ++cell[2])
-        for (cell[1] = 0; cell[1] < field->dims[1]; ++cell[1])
-            for (cell[0] = 0; cell[0] < field->dims[0]; ++cell[0])
-                for (int color = 0; color < 3; ++color)
-                    for (int i = 0; i < 4; ++i) {
-                        const float value = texel(field, cell, color)[i];
-                        if (!isfinite(value) || (i == 0 && value < 0.0f))
-                            fail_msg("cell %d %d %d has %g", cell[0], cell[1], cell[2],
-                                     (double)value);
-                    }
-}
-
-/* --- Scenes --------------------------------------------------------------------------------- */
-
-static brume_scene *empty(void)
-{
-    brume_scene *scene;
-    assert_ok(brume_scene_create(device, &scene));
-    return scene;
-}
-
-static void add_lamp(brume_scene *scene, uint64_t key, const float from[3], float watts)
-{
-    const brume_light lamp = point_lamp(from, watts);
-    assert_ok(brume_scene_set_light(scene, key, &lamp));
-}
-
-/* A closed box around the origin, of a diffuse material. */
-static void add_box(brume_scene *scene, uint64_t key, float half, float reflectance)
-{
-    const brume_material material = {
-        .diffuse = {reflectance, reflectance, reflectance}, .roughness = 1, .alpha = 1};
-    float positions[24];
-    uint32_t triangles[36];
-    cube_mesh(origin, half, positions, triangles);
-    const brume_mesh mesh = {.name = "box",
-                             .positions = positions,
-                             .triangles = triangles,
-                             .materials = &key,
-                             .vertex_count = 8,
-                             .triangle_count = 12,
-                             .material_count = 1};
-    const brume_instances instances = {.world_from_object = identity,
-                                       .mesh = key,
-                                       .count = 1,
-                                       .visibility = BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW};
-    assert_ok(brume_scene_set_material(scene, key, &material));
-    assert_ok(brume_scene_set_mesh(scene, key, &mesh));
-    assert_ok(brume_scene_set_instances(scene, key, &instances));
 }
 
 /* --- Power ---------------------------------------------------------------------------------- */
@@ -201,7 +83,7 @@ static void all_directions_are_alike(void **state)
     add_lamp(scene, 3, (float[3]){0, 0, 5}, 1000.0f);
     struct field field = field_of(scene, &settings, NULL);
     for (int i = 0; i < 3; ++i)
-        assert_int_equal(field.dims[i], 33);
+        assert_int_equal(dims_of(&field)[i], 33);
     for (int color = 0; color < 3; ++color)
         for (int far_ = 1; far_ <= 10; ++far_)
             for (int kind = 0; kind < 3; ++kind) {
@@ -358,29 +240,6 @@ static void a_quarter_turn_is_exact(void **state)
     free(after.texels);
 }
 
-static double between_cells(const struct field *field, const float p[3], int color)
-{
-    double sum = 0.0;
-    int low[3];
-    double f[3];
-    for (int i = 0; i < 3; ++i) {
-        const double at = ((double)p[i] - (double)field->lower[i]) / (double)field->cell - 0.5;
-        low[i] = (int)floor(at);
-        f[i] = at - floor(at);
-    }
-    for (int corner = 0; corner < 8; ++corner) {
-        int cell[3];
-        double weight = 1.0;
-        for (int i = 0; i < 3; ++i) {
-            const int side = corner >> i & 1;
-            cell[i] = low[i] + side;
-            weight *= side ? f[i] : 1.0 - f[i];
-        }
-        sum += weight * fluence(field, cell, color);
-    }
-    return sum;
-}
-
 static void a_turn_changes_little(void **state)
 {
     (void)state;
@@ -392,11 +251,11 @@ static void a_turn_changes_little(void **state)
                 const int index[3] = {x, y, z};
                 float p[3], q[3];
                 for (int i = 0; i < 3; ++i)
-                    p[i] = before.lower[i] + ((float)index[i] + 0.5f) * before.cell;
+                    p[i] = centre(&before, i, index[i]);
                 if (fabsf(p[0] - 0.1f) < 0.3f && fabsf(p[1] + 0.3f) < 0.3f && fabsf(p[2]) < 0.3f)
                     continue; /* in the solid, or in cells that it cuts */
                 turn(30.0f, p, q);
-                const double a = between_cells(&before, p, 0), b = between_cells(&after, q, 0);
+                const double a = fluence_at(&before, p, 0), b = fluence_at(&after, q, 0);
                 off += fabs(a - b);
                 all += a;
             }

@@ -1,0 +1,200 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Lattices within one another: that the inner ones know the light from outside, show what is finer in
+ * them, and stay where they are while the camera moves a little. */
+#include "field.h"
+
+#define CELLS 16
+#define RINGS 6 /* of the inner lattice's cells, from its sides inwards */
+
+static brume_settings settings_for(int cells, int cascades)
+{
+    return (brume_settings){.method = BRUME_METHOD_LPV,
+                            .medium_resolution = 32,
+                            .lattice_resolution = 32,
+                            .field_resolution = cells,
+                            .cascades = cascades,
+                            .shadow_resolution = 64,
+                            .light_samples = 1,
+                            .world_samples = 16};
+}
+
+static int ring_of(const int cell[3], const int dims[3])
+{
+    int ring = dims[0];
+    for (int i = 0; i < 3; ++i) {
+        const int last = dims[i] - 1 - cell[i], nearest = cell[i] < last ? cell[i] : last;
+        ring = nearest < ring ? nearest : ring;
+    }
+    return ring;
+}
+
+/* Sums over a ring of cells: the fluence of a lattice of the finer cells, of that in the coarser one, and
+ * of the coarser; and how far the latter two are from the first, where that is asked for. */
+struct ring {
+    double fine, within, coarse, within_off, coarse_off;
+};
+
+/* In a closed box with fog and a lamp. */
+static void compare(float sigma_s, float reflectance, const float lamp[3], bool with_fine,
+                    struct ring rings[RINGS])
+{
+    const struct coefficients fog = {.sigma_s = {sigma_s, sigma_s, sigma_s},
+                                     .sigma_a = {0.05f, 0.05f, 0.05f}};
+    brume_scene *scene = empty();
+    add_box(scene, 1, 1.0f, reflectance);
+    add_fog_cube(scene, 2, origin, 1.0f, &fog);
+    add_lamp(scene, 3, lamp, 1.0f);
+    brume_settings settings = settings_for(CELLS, 1);
+    struct field coarse = field_of(scene, &settings, NULL);
+    settings = settings_for(CELLS, 2);
+    struct field within = field_of(scene, &settings, NULL);
+    settings = settings_for(2 * CELLS, 1);
+    struct field fine = with_fine ? field_of(scene, &settings, NULL) : coarse;
+    within.level = 1;
+    const int *dims = dims_of(&within);
+    int cell[3];
+    for (cell[2] = 0; cell[2] < dims[2]; ++cell[2])
+        for (cell[1] = 0; cell[1] < dims[1]; ++cell[1])
+            for (cell[0] = 0; cell[0] < dims[0]; ++cell[0]) {
+                const int number = ring_of(cell, dims);
+                if (number >= RINGS)
+                    continue;
+                struct ring *ring = &rings[number];
+                float p[3];
+                for (int i = 0; i < 3; ++i)
+                    p[i] = centre(&within, i, cell[i]);
+                const double f = fluence_at(&fine, p, 0), c = fluence_at(&coarse, p, 0);
+                const double w = fluence(&within, cell, 0);
+                ring->fine += f;
+                ring->within += w;
+                ring->coarse += c;
+                ring->within_off += fabs(w - f);
+                ring->coarse_off += fabs(c - f);
+            }
+    if (with_fine)
+        free(fine.texels);
+    free(within.texels);
+    free(coarse.texels);
+    brume_scene_destroy(scene);
+}
+
+/* As bright as the lattice around it: what comes in over its sides is all, and not more, in thin and in
+ * thick fog, from afar and reflected to and fro. */
+static void as_bright_as_around(void **state)
+{
+    (void)state;
+    static const struct {
+        float sigma_s, reflectance;
+    } cases[] = {{0.5f, 0.3f}, {0.5f, 0.8f}, {4.0f, 0.3f}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        struct ring rings[RINGS] = {0};
+        compare(cases[i].sigma_s, cases[i].reflectance, (float[3]){0.8f, 0.2f, -0.3f}, false,
+                rings);
+        for (int r = 0; r < RINGS; ++r) {
+            print_message("sigma_s %g, reflectance %g, ring %d: %.2f %%\n", (double)cases[i].sigma_s,
+                          (double)cases[i].reflectance, r,
+                          100.0 * (rings[r].within / rings[r].coarse - 1.0));
+            assert_close(rings[r].within, rings[r].coarse, 0.03);
+        }
+    }
+}
+
+/* Where a lamp stands in it, light changes much from cell to cell: it is as finer cells have it. */
+static void finer_within(void **state)
+{
+    (void)state;
+    struct ring rings[RINGS] = {0};
+    compare(0.5f, 0.3f, (float[3]){0.1f, 0.2f, -0.1f}, true, rings);
+    double within = 0.0, coarse = 0.0, all = 0.0;
+    for (int r = 3; r < RINGS; ++r) {
+        within += rings[r].within_off;
+        coarse += rings[r].coarse_off;
+        all += rings[r].fine;
+    }
+    print_message("off finer cells: within %.2f %%, around %.2f %%\n", 100.0 * within / all,
+                  100.0 * coarse / all);
+    assert_true(within < 0.5 * coarse);
+}
+
+/* --- The focus -------------------------------------------------------------------------------- */
+
+static uint64_t transports(brume_scene *scene, const brume_settings *settings, const float target[3],
+                           struct field *out)
+{
+    const brume_view view = orthographic_view(target, (float[3]){0, 1, 0}, 0.5f, 0.5f, 4);
+    brume_job *job = render(scene, settings, &view);
+    brume_stats stats;
+    assert_ok(brume_job_stats(job, &stats));
+    brume_job_release(job);
+    *out = (struct field){.scene = scene};
+    device_call(device, fetch, out);
+    free(out->texels);
+    return stats.stages[BRUME_STAGE_TRANSPORT].runs;
+}
+
+static void around_the_camera(void **state)
+{
+    (void)state;
+    brume_scene *scene = empty();
+    add_box(scene, 1, 1.0f, 0.5f);
+    add_fog_cube(scene, 2, (float[3]){0.4f, 0, 0}, 0.5f, &white_fog);
+    add_lamp(scene, 3, (float[3]){0.5f, 0.2f, -0.3f}, 1.0f);
+    brume_settings settings = settings_for(CELLS, 2);
+    struct field there, here;
+    /* The medium's middle, wherever the camera is. */
+    const uint64_t first = transports(scene, &settings, (float[3]){-0.6f, 0, 0}, &there);
+    assert_int_equal(transports(scene, &settings, (float[3]){0.6f, 0, 0}, &here), first);
+    const float middle = there.levels[1].lower.x + 0.5f * (float)there.levels[1].dims.x *
+                                                       there.levels[1].lower.w;
+    assert_true(fabsf(middle - 0.4f) < 0.13f);
+    /* The camera's own: its side does not come nearer than that to the lattice around. */
+    settings.cascade_focus = BRUME_FOCUS_CAMERA;
+    const uint64_t begun = transports(scene, &settings, (float[3]){-0.3f, 0, 0}, &there);
+    assert_int_equal(begun, first + 1);
+    assert_int_equal(transports(scene, &settings, (float[3]){-0.31f, 0, 0}, &here), begun);
+    assert_true(here.levels[1].lower.x == there.levels[1].lower.x);
+    assert_int_equal(transports(scene, &settings, (float[3]){0.3f, 0, 0}, &here), begun + 1);
+    assert_true(here.levels[1].lower.x > there.levels[1].lower.x + 0.3f);
+    brume_scene_destroy(scene);
+}
+
+/* --- Hostile settings ------------------------------------------------------------------------- */
+
+static void odd_lattices(void **state)
+{
+    (void)state;
+    static const int cells[] = {2, 3, 5, 9};
+    brume_scene *scene = empty();
+    add_box(scene, 1, 1.0f, 0.9f);
+    add_fog_cube(scene, 2, origin, 1.0f, &white_fog);
+    add_lamp(scene, 3, (float[3]){0.5f, 0.2f, -0.3f}, 1.0f);
+    for (size_t i = 0; i < sizeof cells / sizeof *cells; ++i)
+        for (uint32_t blockers = 0; blockers < BRUME_BLOCKERS_COUNT; ++blockers) {
+            brume_settings settings = settings_for(cells[i], 3);
+            settings.blockers = blockers;
+            settings.iterations = 5;
+            struct field field = field_of(scene, &settings, NULL);
+            for (field.level = 0; field.level < 3; ++field.level)
+                assert_sound(&field);
+            free(field.texels);
+        }
+    brume_settings settings = settings_for(8, 4);
+    const brume_view view = orthographic_view(origin, (float[3]){0, 0, -1}, 0.1f, 5.0f, 4);
+    brume_job *job = NULL;
+    assert_int_equal(brume_render(scene, &settings, &view, &job), BRUME_E_ARGUMENT);
+    settings = settings_for(8, 1);
+    settings.cascade_focus = 7;
+    assert_int_equal(brume_render(scene, &settings, &view, &job), BRUME_E_ARGUMENT);
+    brume_scene_destroy(scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(as_bright_as_around),
+        cmocka_unit_test(finer_within),
+        cmocka_unit_test(around_the_camera),
+        cmocka_unit_test(odd_lattices),
+    };
+    return cmocka_run_group_tests(tests, open_device, close_device);
+}

@@ -17,7 +17,7 @@ layout(binding = SLOT_WALLS) uniform usampler3D wall_sums;
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D cell_image[3]; // extinction,
                                                                  // albedo, surfaces' reflectance
 
-const int SAMPLES = 4; // along a side
+const int POINTS = 128; // along the lattice
 
 void main()
 {
@@ -30,9 +30,11 @@ void main()
     // reduced coefficient sigma_s (1 - g).
     vec3 extinct = vec3(0.0), scatter = vec3(0.0);
     if (medium_exists() && stage.offset.x != 0) {
-        for (int i = 0; i < SAMPLES * SAMPLES * SAMPLES; ++i) {
-            vec3 p = lower + (vec3(i % SAMPLES, i / SAMPLES % SAMPLES, i / (SAMPLES * SAMPLES)) + 0.5) *
-                                 (side / float(SAMPLES));
+        int points = points_in_cell(POINTS, 4);
+        int all = points * points * points;
+        for (int i = 0; i < all; ++i) {
+            vec3 p = lower + (vec3(i % points, i / points % points, i / (points * points)) + 0.5) *
+                                 (side / float(points));
             if (!in_box(p, frame.medium_lower.xyz, frame.medium_upper.xyz))
                 continue;
             vec3 uvw = medium_coordinate(p);
@@ -40,8 +42,8 @@ void main()
             extinct += textureLod(medium_extinct, uvw, 0.0).rgb - s.rgb * s.a;
             scatter += s.rgb * (1.0 - s.a);
         }
-        extinct /= float(SAMPLES * SAMPLES * SAMPLES);
-        scatter /= float(SAMPLES * SAMPLES * SAMPLES);
+        extinct /= float(all);
+        scatter /= float(all);
     }
     if (fog_exists() && stage.offset.x != 0) {
         vec3 filled = clamp((min(frame.fog_upper.xyz, lower + side) -

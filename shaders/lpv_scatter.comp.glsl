@@ -22,7 +22,7 @@ layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D flow_image[3];
 
 #include "lib/power.glsl"
 
-const int SAMPLES = 2; // along a side
+const int POINTS = 64; // along the lattice
 
 // The mean of 1/d^2 over a cube of that side around a point, to the second order (its Laplacian is
 // 2/d^4), and no more than over a cube around the lamp itself.
@@ -85,12 +85,13 @@ float begin(ivec3 cell)
         flow[c] = texelFetch(reflected[c], texel, 0);
     if (stage.offset.x != 0) {
         uint start = hash(uint(cell.x) + hash(uint(cell.y) + hash(uint(cell.z))));
-        float part = side / float(SAMPLES);
-        for (uint i = 0u; i < uint(SAMPLES * SAMPLES * SAMPLES); ++i) {
+        int points = points_in_cell(POINTS, 4);
+        float part = side / float(points);
+        for (int i = 0; i < points * points * points; ++i) {
             // No lots: what is turned by a right angle is lit alike.
             vec3 p = level.lower.xyz + vec3(cell) * side +
-                     (vec3(i & 1u, i >> 1u & 1u, i >> 2u) + 0.5) * part;
-            add_scattered(flow, p, part, start + i);
+                     (vec3(i % points, i / points % points, i / (points * points)) + 0.5) * part;
+            add_scattered(flow, p, part, start + uint(i));
         }
     }
     float power = 0.0;

@@ -135,14 +135,15 @@ static void add_lamp(brume_scene *scene, uint64_t key, const float from[3], floa
     assert_ok(brume_scene_set_light(scene, key, &lamp));
 }
 
-/* A closed box around the origin, of a diffuse material. */
-static void add_box(brume_scene *scene, uint64_t key, float half, float reflectance)
+/* A closed box of a diffuse material. */
+static void add_box_at(brume_scene *scene, uint64_t key, const float middle[3], float half,
+                       float reflectance)
 {
     const brume_material material = {
         .diffuse = {reflectance, reflectance, reflectance}, .roughness = 1, .alpha = 1};
     float positions[24];
     uint32_t triangles[36];
-    cube_mesh(origin, half, positions, triangles);
+    cube_mesh(middle, half, positions, triangles);
     const brume_mesh mesh = {.name = "box",
                              .positions = positions,
                              .triangles = triangles,
@@ -157,6 +158,12 @@ static void add_box(brume_scene *scene, uint64_t key, float half, float reflecta
     assert_ok(brume_scene_set_material(scene, key, &material));
     assert_ok(brume_scene_set_mesh(scene, key, &mesh));
     assert_ok(brume_scene_set_instances(scene, key, &instances));
+}
+
+/* The same around the origin. */
+static void add_box(brume_scene *scene, uint64_t key, float half, float reflectance)
+{
+    add_box_at(scene, key, origin, half, reflectance);
 }
 
 #endif

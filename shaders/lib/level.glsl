@@ -12,6 +12,14 @@ bool in_level(ivec3 cell)
     return in_field(level, cell);
 }
 
+// Points along a cell's side that stand for what is in it: as many in all as that along the lattice's
+// longest side, at least, so that a finer lattice takes no longer to ask them.
+int points_in_cell(int in_all, int most)
+{
+    int longest = max(level.dims.x, max(level.dims.y, level.dims.z));
+    return clamp((in_all + longest - 1) / longest, 1, most);
+}
+
 // Where a cell stands in a picture of a lattice with its layers as tiles, so many in a row.
 ivec2 tiled_texel(ivec3 cell, ivec3 dims, int row)
 {

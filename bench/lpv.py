@@ -32,7 +32,7 @@ REFERENCES = os.path.join(ROOT, 'build', 'references')
 OUT = os.path.join(ROOT, 'out', 'bench')
 PATHS = ('DIRECT', 'REFLECTED', 'SINGLE', 'REFLECTED_MARCHED', 'SUM', 'ALL')
 CELLS = 32
-FINER = 64  # of ALL alone
+FINER = 64  # of ALL alone, as cascades
 SIZE = 256
 NOISE = 0.01
 # All light: as many bounces as matter, nothing clamped, nothing smoothed.
@@ -98,20 +98,21 @@ def reference(case, most):
 
 
 def brume(case, kinds):
-    """Pictures of (light paths, cells)."""
+    """Pictures of (light paths, cells, cascades)."""
     return run(case, [{'engine': 'BRUME', 'settings': {
-        'method': 'LPV', 'iterations': 0, 'light_paths': paths, 'field_resolution': cells}}
-        for paths, cells in kinds])
+        'method': 'LPV', 'iterations': 0, 'light_paths': paths, 'field_resolution': cells,
+        'cascades': cascades, 'cascade_focus': 'CAMERA'}}
+        for paths, cells, cascades in kinds])
 
 
 def measure(case, most):
     picture, noise = reference(case, most)
     print(f'{case.scene}: Cycles\' noise {noise:.4f}', file=sys.stderr)
-    kinds = [*((paths, CELLS) for paths in PATHS), ('ALL', FINER)]
+    kinds = {**{paths: (paths, CELLS, 1) for paths in PATHS}, f'ALL_{FINER}': ('ALL', FINER, 1),
+             'ALL_CASCADES': ('ALL', CELLS, 2)}
     errors = {}
     np.save(os.path.join(OUT, 'lpv', f'{case.scene}-CYCLES.npy'), picture.astype(np.float32))
-    for (paths, cells), found in zip(kinds, brume(case, kinds)):
-        name = paths if cells == CELLS else f'{paths}_{cells}'
+    for name, found in zip(kinds, brume(case, kinds.values())):
         errors[name] = compare.difference(found, picture)[0]
         path = os.path.join(OUT, 'lpv', f'{case.scene}-{name}')
         np.save(path + '.npy', found)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the Markdown tables of the docs from the JSON lines of bench/peers.py, viewport.py,
-export.py, opv.py or lpv.py.
+export.py, opv.py, lpv.py or lpv_parts.py.
 
     python3 bench/table.py FILE.jsonl [--into docs/PAGE.md]
 
@@ -203,7 +203,8 @@ def lpv_page(lines):
     yield row('light', 'cells', *(f'`{name}.blend`' for name in scenes))
     yield row('---', '---:', *['---:'] * len(scenes))
     for paths, name in PATHS.items():
-        for key, cells in ((paths, line['cells']), (f'{paths}_{line["finer"]}', line['finer'])):
+        for key, cells in ((paths, line['cells']), (f'{paths}_{line["finer"]}', line['finer']),
+                           (f'{paths}_CASCADES', f'{line["cells"]}, and as many around the camera')):
             if all(key in scene['errors'] for scene in scenes.values()):
                 yield row(name, cells,
                           *(f'{100 * scene["errors"][key]:.1f} %' for scene in scenes.values()))
@@ -212,8 +213,35 @@ def lpv_page(lines):
     yield ''
 
 
+PART_NAMES = {'surfaces': 'links that surfaces cut', 'media': 'media of cells',
+              'reflected': 'injection of reflected light',
+              'scattered': 'injection of light scattered once', 'blockers': 'injection of blockers',
+              'aggregate': 'aggregation of blockers', 'prepare': 'blocking factors',
+              'iterations': 'iterations', 'copy': 'copy'}
+
+
+def lpv_parts_page(lines):
+    line = lines[-1]
+    kinds, sizes = list(line['parts']), list(line['parts']['LINKS'])
+    yield (f'{line["device"]}; commit {version(line)}. Milliseconds, the least of '
+           f'{line["repeats"]} frames.')
+    yield ''
+    yield row('', *(f'{"exact" if kind == "LINKS" else "fuzzy"} blockers, {size}³'
+                    for kind in kinds for size in sizes))
+    yield row('---', *['---:'] * (len(kinds) * len(sizes)))
+    for part, name in PART_NAMES.items():
+        label = f'{line["iterations"]} {name}' if part == 'iterations' else name
+        yield row(label, *(f'{found:.1f}' if (found := line['parts'][kind][size][part]) else ''
+                           for kind in kinds for size in sizes))
+    yield ''
+    yield (f'The march of the view: {line["march"]["full"]:.1f} ms, at half the resolution '
+           f'{line["march"]["half"]:.1f} ms.')
+    yield ''
+
+
 PAGES = {'peers': page, 'viewport': viewport_page}
-WHOLE_PAGES = {'export': export_page, 'opv': opv_page, 'lpv': lpv_page}
+WHOLE_PAGES = {'export': export_page, 'opv': opv_page, 'lpv': lpv_page,
+               'lpv_parts': lpv_parts_page}
 
 
 def main():

@@ -6,10 +6,10 @@
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 [ $# -gt 0 ] || set -- plume plume_vdb cloud room cube lamps surfaces environment \
-    fog_one fog_sixteen fog_lights arcade
+    fog_one fog_sixteen fog_lights arcade room_smoke partition
 for name; do
     case $name in
-        fog_* | arcade) blender=$here/../scripts/blender ;;
+        fog_* | arcade | room_smoke | partition) blender=$here/../scripts/blender ;;
         *) blender=${BLENDER:-blender} ;;
     esac
     "$blender" -b --factory-startup --python-exit-code 1 -P "$here/build_$name.py"

@@ -32,6 +32,8 @@ PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONME
           "TRANSMITTANCE", "VOLUME_INDIRECT")
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3, 3)
 STAGES = ("upload", "medium", "shadow", "transport", "gbuffer", "shade", "march", "passes")
+FIELD_PARTS = ("surfaces", "media", "reflected", "scattered", "blockers", "aggregate", "prepare",
+               "iterations", "copy")
 METHODS = {"OPV": 0, "LPV": 1}
 LIGHT_PATHS = {"ALL": 0, "DIRECT": 1, "REFLECTED": 2, "SINGLE": 3, "REFLECTED_MARCHED": 4,
                "SUM": 5}

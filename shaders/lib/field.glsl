@@ -34,17 +34,21 @@ ivec3 texel_of(gpu_field field, ivec3 cell, int number)
 
 // The cell on whose side of the surfaces a point is: the nearest, or along an axis the one that no
 // cut lies before. `low`: the cell before it on all axes, f: how far it is on the way to the next.
+// Twice around the axes: in a corner the nearest cell may be behind a wall, and know nothing of the
+// others there.
 ivec3 home_of(gpu_field field, ivec3 low, vec3 f, ivec3 last)
 {
     ivec3 home = low + ivec3(step(0.5, f));
-    for (int axis = 0; axis < 3; ++axis) {
+    for (int i = 0; i < 6; ++i) {
+        int axis = i % 3;
         ivec3 before = home;
         before[axis] = low[axis];
         if (any(lessThan(before, ivec3(0))) || any(greaterThan(before, last)))
             continue;
-        uint where = uint(texelFetch(field_lattice, texel_of(field, before, 3), 0).z) >> (8 * axis) & 255u;
-        if (where != 0u)
-            home[axis] = low[axis] + (f[axis] * 253.0 + 1.0 < float(where) + 0.5 ? 0 : 1);
+        uint where = uint(texelFetch(field_lattice, texel_of(field, before, 3), 0).z) >> (8 * axis) &
+                     255u;
+        bool beyond = where != 0u ? f[axis] * 253.0 + 1.0 >= float(where) + 0.5 : f[axis] >= 0.5;
+        home[axis] = low[axis] + int(beyond);
     }
     return clamp(home, ivec3(0), last);
 }
@@ -70,8 +74,9 @@ field_light field_between(gpu_field field, vec3 p, vec4 plane)
     ivec3 home = home_of(field, low, f, last);
     vec2 sides = texelFetch(field_lattice, texel_of(field, home, 3), 0).xy;
     uint cuts = uint(sides.x) | uint(sides.y) << 13;
-    // A cell that nearly all links to are cut is within something small, and tells nothing.
-    bool within = bitCount(cuts) > 17;
+    // A cell that more links to are cut than to one where three walls meet is within something small,
+    // and tells nothing.
+    bool within = bitCount(cuts) > 19;
     field_light light = field_light(vec3(0.0), mat3(0.0));
     float sum = 0.0;
     int corners = 8 * min(frame.field.x, 1); // not unrolled, which would take seconds to compile

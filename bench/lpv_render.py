@@ -3,8 +3,8 @@
 
 blender -b -P lpv_render.py -- '{"scene": NAME, "size": PIXELS, "zoom": FACTOR, "jobs": [...]}'
 
-Each job has "engine", "settings", which are set of scene.cycles or scene.brume, and "out", an .npy
-of float32 (height, width, 3), linear, first row at the bottom.
+Each job has "engine", "settings", which are set of scene.cycles or scene.brume, perhaps the name of
+a "camera", and "out", an .npy of float32 (height, width, 3), linear, first row at the bottom.
 """
 import json
 import os
@@ -48,6 +48,8 @@ def main(work):
     with tempfile.TemporaryDirectory() as folder:
         render.filepath = os.path.join(folder, 'picture.exr')
         for job in work['jobs']:
+            if 'camera' in job:
+                scene.camera = bpy.data.objects[job['camera']]
             set_up(scene, job['engine'], job['settings'])
             started = time.monotonic()
             bpy.ops.render.render(write_still=True)

@@ -204,7 +204,7 @@ def lpv_page(lines):
     yield row('---', '---:', *['---:'] * len(scenes))
     for paths, name in PATHS.items():
         for key, cells in ((paths, line['cells']), (f'{paths}_{line["finer"]}', line['finer']),
-                           (f'{paths}_CASCADES', f'{line["cells"]}, and as many around the camera')):
+                           (f'{paths}_CASCADES', f'{line["cells"]}, 2 cascades')):
             if all(key in scene['errors'] for scene in scenes.values()):
                 yield row(name, cells,
                           *(f'{100 * scene["errors"][key]:.1f} %' for scene in scenes.values()))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds partition.blend: what is hard for lattices of light. A closed room, a thin board across it, and
-a strong spot close to the board: "Camera" sees the dark side of it, "Lit side" the other.
+"""Builds partition.blend: what is hard for lattices of light. A closed room, a thin board across,
+and a strong spot close to the board: "Camera" sees the dark side of it, "Lit side" the other.
 
 After Figure 6 of "Light Propagation Volumes with scattering": light that bleeds through thin walls,
 light that begins in a few cells, and, with one iteration, light that does not get far.

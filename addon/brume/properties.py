@@ -92,8 +92,8 @@ class BrumeSettings(bpy.types.PropertyGroup):
     cascades: IntProperty(
         name="Cascades", update=changed, default=1, min=1, max=3,
         description="Lattices of scattered and reflected light, each within the last and half as "
-                    "long, with as many cells: finer where it counts, without a finer whole. Each "
-                    "takes about as long as the first, and a fifth of its memory")
+                    "long, with as many cells: finer where it counts, without a finer whole. Two "
+                    "take three times as long as one, three seven times")
     cascade_focus: EnumProperty(
         name="Finer Around", update=changed, default='MEDIUM',
         description="What the cascades after the first surround",

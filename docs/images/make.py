@@ -3,10 +3,11 @@
 """Makes the user guide's pictures: scenes rendered by Brume, and its panels in Blender's window.
 
     docs/images/make.py [NAME]...    all, or some: room cloud fog_lights fog_sixteen panels viewport
-                                     lpv_paths
+                                     lpv_paths lpv_hard
 
 Needs what scripts/setup installs, and a built library; a virtual display is its own. lpv_paths sets
-side by side what `bench/lpv.py --scenes room` left in out/bench/lpv.
+side by side what `bench/lpv.py --scenes room` left in out/bench/lpv; lpv_hard takes some minutes,
+for Cycles.
 """
 
 import subprocess
@@ -15,6 +16,11 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "bench"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "pictures"))
+import compare
+import lpv
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
@@ -123,28 +129,49 @@ def window(name, steps, width, height):
             display=f"{width}x{height}")
 
 
-def sheet(name):
-    """The room's light in parts, in the order of bench/lpv.py, and last Cycles: four in a row."""
-    sys.path[:0] = map(str, (ROOT / "bench", ROOT / "tests" / "pictures"))
-    import compare
-    from lpv import OUT, PATHS
-    files = [Path(OUT) / "lpv" / f"room-{kind}.npy" for kind in (*PATHS, "CYCLES")]
-    missing = [file for file in files if not file.exists()]
-    if missing:
-        sys.exit(f"make.py: {missing[0]} is not there: run bench/lpv.py --scenes room")
-    pictures = [np.load(file) for file in files]
-    exposure = 0.8 / np.percentile(pictures[-1], 97)
-    side, gap, across = pictures[0].shape[0], 8, 4
+def sheet(name, pictures, across, exposures):
+    """Linear pictures, so many in a row, each times its exposure."""
+    side, gap = pictures[0].shape[0], 8
     down = -(-len(pictures) // across)
     page = np.ones((down * (side + gap) - gap, across * (side + gap) - gap, 3))
-    for number, picture in enumerate(pictures):
+    for number, (picture, exposure) in enumerate(zip(pictures, exposures)):
         row, column = divmod(number, across)
         y, x = (down - 1 - row) * (side + gap), column * (side + gap)  # the first row is the lowest
         page[y:y + side, x:x + side] = compare.srgb(picture * exposure)
     compare.write_png(HERE / f"{name}.png", page)
 
 
-SHEETS = ("lpv_paths",)
+def exposure_of(picture):
+    return 0.8 / np.percentile(picture, 97)
+
+
+def lpv_paths(name):
+    """The room's light in parts, in the order of bench/lpv.py, and last Cycles: four in a row."""
+    files = [Path(lpv.OUT) / "lpv" / f"room-{kind}.npy" for kind in (*lpv.PATHS, "CYCLES")]
+    missing = [file for file in files if not file.exists()]
+    if missing:
+        sys.exit(f"make.py: {missing[0]} is not there: run bench/lpv.py --scenes room")
+    pictures = [np.load(file) for file in files]
+    sheet(name, pictures, 4, [exposure_of(pictures[-1])] * len(pictures))
+
+
+def lpv_hard(name):
+    """Figure 6 of LPV's paper: the dark side of a thin board, exact, fuzzy and Cycles; its lit
+    side, whole, with one iteration, and Cycles."""
+    jobs = []
+    for camera, brume in (("Camera", ({"blockers": 'LINKS'}, {"blockers": 'FUZZY'})),
+                          ("Lit side", ({"iterations": 0}, {"iterations": 1}))):
+        jobs += [{"camera": camera, "engine": 'BRUME',
+                  "settings": {"method": 'LPV', "blockers": 'LINKS', "iterations": 0, **settings}}
+                 for settings in brume]
+        jobs.append({"camera": camera, "engine": 'CYCLES',
+                     "settings": {**lpv.CYCLES, "samples": 768}})
+    pictures = lpv.run(lpv.Case("partition", 0), jobs)
+    dark, lit = exposure_of(pictures[1]), exposure_of(pictures[3])
+    sheet(name, pictures, 3, [dark] * 3 + [lit] * 3)
+
+
+SHEETS = {"lpv_paths": lpv_paths, "lpv_hard": lpv_hard}
 WINDOWS = {"panels": (PANELS, 820, 560), "viewport": (VIEWPORT, 1100, 720)}
 
 for wanted in sys.argv[1:] or (*SCENES, *WINDOWS, *SHEETS):
@@ -153,7 +180,7 @@ for wanted in sys.argv[1:] or (*SCENES, *WINDOWS, *SHEETS):
     elif wanted in SCENES:
         scene(wanted)
     elif wanted in SHEETS:
-        sheet(wanted)
+        SHEETS[wanted](wanted)
     else:
         sys.exit(f"make.py: there is no picture {wanted}")
     # Blender stamps the file's path into a picture.

@@ -93,7 +93,8 @@ def test_light_propagation(scene, render, monkeypatch):
     native_render = native.Scene.render
     monkeypatch.setattr(native.Scene, "render", lambda self, settings, view: (
         asked.append((settings.method, settings.light_paths, settings.blockers,
-                      settings.field_resolution)), native_render(self, settings, view))[1])
+                      settings.field_resolution, settings.cascades, settings.cascade_focus)),
+        native_render(self, settings, view))[1])
     single = render()[..., :3].sum()
     scene.brume.method = 'LPV'
     found = {}
@@ -102,7 +103,10 @@ def test_light_propagation(scene, render, monkeypatch):
         found[paths] = render(paths)[..., :3].sum()
     scene.brume.light_paths, scene.brume.blockers = 'ALL', 'FUZZY'
     render("fuzzy")
-    assert asked == [(0, 0, 0, 8), *((1, number, 0, 8) for number in range(6)), (1, 0, 1, 8)]
+    scene.brume.cascades, scene.brume.cascade_focus = 2, 'CAMERA'
+    render("cascades")
+    assert asked == [(0, 0, 0, 8, 1, 0), *((1, number, 0, 8, 1, 0) for number in range(6)),
+                     (1, 0, 1, 8, 1, 0), (1, 0, 1, 8, 2, 1)]
     assert found["ALL"] > 1.02 * single
     np.testing.assert_allclose(found["SINGLE"], single, rtol=1e-3)
     assert found["DIRECT"] < found["SINGLE"] <= found["SUM"] <= found["ALL"]

@@ -39,10 +39,14 @@ def test_numbers():
         assert enumerator(f"BRUME_PASS_{name}") == number
         assert native.library().pass_channels(number) == native.PASS_CHANNELS[number]
     for kinds, prefix in ((native.KINDS, "KIND"), (native.LIGHTS, "LIGHT"),
-                          (native.ALPHA, "ALPHA"), (native.METHODS, "METHOD")):
+                          (native.ALPHA, "ALPHA"), (native.METHODS, "METHOD"),
+                          (native.BLOCKERS, "BLOCKERS"), (native.FOCUS, "FOCUS")):
         for name, number in kinds.items():
             assert enumerator(f"BRUME_{prefix}_{name.upper()}") == number
     assert len(native.STAGES) == enumerator("BRUME_STAGE_COUNT")
+    assert len(native.FIELD_PARTS) == enumerator("BRUME_FIELD_PARTS")
+    for number, name in enumerate(native.FIELD_PARTS):
+        assert native.library().field_part_name(number) == name.encode()
 
 
 def test_missing_file_has_an_id_and_names_the_file(tmp_path):

@@ -89,8 +89,7 @@ static double fluence_at(const struct field *field, const float p[3], int color)
     int low[3];
     double f[3];
     for (int i = 0; i < 3; ++i) {
-        const double at =
-            ((double)p[i] - (double)centre(field, i, 0)) / (double)cell_of(field);
+        const double at = ((double)p[i] - (double)centre(field, i, 0)) / (double)cell_of(field);
         low[i] = (int)floor(at);
         f[i] = at - floor(at);
     }

@@ -100,8 +100,7 @@ brume_result texture_init(struct memory *memory, struct texture *texture, enum p
                           int levels, const char *label)
 {
     /* Which are fetched, never filtered. */
-    const int integers = format == GL_R32UI || format == GL_RGBA8UI ||
-                         format == GL_RGBA32UI;
+    const int integers = format == GL_R32UI || format == GL_RGBA8UI || format == GL_RGBA32UI;
     memset(texture, 0, sizeof *texture);
     while (glGetError() != GL_NO_ERROR)
         ;

@@ -188,8 +188,8 @@ static bool settled(struct series *so_far, double power)
     return power / left * fmin(to_come / left, 1.0) < CONVERGED * so_far->flown;
 }
 
-/* `counts`: what this iteration's light counts in the field. Into *power what is in flight after it,
- * unless that is NULL: to look takes time. */
+/* `counts`: what this iteration's light counts in the field. Into *power what is in flight after
+ * it, unless that is NULL: to look takes time. */
 static brume_result iterate(struct lpv_work *work, double counts, double *power)
 {
     const union {
@@ -236,8 +236,8 @@ static brume_result propagate(struct lpv_work *work)
     struct series so_far = {0};
     double counts = 1.0;
     for (int i = 0; i < most; ++i) {
-        const bool look = i % ITERATIONS_A_LOOK == ITERATIONS_A_LOOK - 1 || i == most - 1 ||
-                          counts != 1.0;
+        const bool look =
+            i % ITERATIONS_A_LOOK == ITERATIONS_A_LOOK - 1 || i == most - 1 || counts != 1.0;
         /* Of iterations until it converged nobody knows how many there will be. */
         work->passes.done =
             1.0f + 0.5f * (float)i / (float)(wanted > 0 ? wanted : i + USUAL_ITERATIONS);

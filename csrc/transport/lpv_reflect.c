@@ -115,8 +115,7 @@ static brume_result one_map(struct lpv_work *work, struct maps *maps,
     const int texels = what.w * what.w;
     laps_go(work->laps, BRUME_FIELD_REFLECTED);
     TRY(draw_map(work, maps, view, what, scale));
-    TRY(lpv_strew(work, "lpv_reflect", maps->target, &work->field->dims, work->tiles,
-                  texels));
+    TRY(lpv_strew(work, "lpv_reflect", maps->target, &work->field->dims, work->tiles, texels));
     if (!lpv_is_fuzzy(work))
         return BRUME_OK;
     laps_go(work->laps, BRUME_FIELD_BLOCKERS);

@@ -113,7 +113,8 @@ static double light_at(brume_scene *scene, const brume_settings *settings, const
     return sum / (PIXELS * PIXELS);
 }
 
-/* Lattices that light goes on in. The inner ones end in the middle of the walls' and the fog's sides. */
+/* Lattices that light goes on in. The inner ones end in the middle of the walls' and the fog's
+ * sides. */
 struct lattices {
     const char *name;
     int resolution, cascades;
@@ -150,8 +151,7 @@ static void through_a_wall(void **state)
         for (size_t r = 0; r < sizeof lattices / sizeof *lattices; ++r) {
             double lit, fuzzy_lit;
             const double links = leak(&walls[w], &lattices[r], BRUME_BLOCKERS_LINKS, 1, &lit);
-            const double fuzzy =
-                leak(&walls[w], &lattices[r], BRUME_BLOCKERS_FUZZY, 1, &fuzzy_lit);
+            const double fuzzy = leak(&walls[w], &lattices[r], BRUME_BLOCKERS_FUZZY, 1, &fuzzy_lit);
             printf("| %s | %g° | %s | %.1e | %.1f %% | %.0f %% |\n", walls[w].name,
                    (double)walls[w].degrees, lattices[r].name, links, 100.0 * fuzzy,
                    100.0 * fuzzy_lit / lit);

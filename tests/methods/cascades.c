@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Lattices within one another: that the inner ones know the light from outside, show what is finer in
- * them, and stay where they are while the camera moves a little. */
+/* Lattices within one another: that the inner ones know the light from outside, show what is finer
+ * in them, and stay where they are while the camera moves a little. */
 #include "field.h"
 
 #define CELLS 16
@@ -28,8 +28,9 @@ static int ring_of(const int cell[3], const int dims[3])
     return ring;
 }
 
-/* Sums over a ring of cells: the fluence of a lattice of the finer cells, of that in the coarser one, and
- * of the coarser; and how far the latter two are from the first, where that is asked for. */
+/* Sums over a ring of cells: the fluence of a lattice of the finer cells, of that in the coarser
+ * one, and of the coarser; and how far the latter two are from the first, where that is asked for.
+ */
 struct ring {
     double fine, within, coarse, within_off, coarse_off;
 };
@@ -78,8 +79,8 @@ static void compare(float sigma_s, float reflectance, const float lamp[3], bool 
     brume_scene_destroy(scene);
 }
 
-/* As bright as the lattice around it: what comes in over its sides is all, and not more, in thin and in
- * thick fog, from afar and reflected to and fro. */
+/* As bright as the lattice around it: what comes in over its sides is all, and not more, in thin
+ * and in thick fog, from afar and reflected to and fro. */
 static void as_bright_as_around(void **state)
 {
     (void)state;
@@ -91,8 +92,8 @@ static void as_bright_as_around(void **state)
         compare(cases[i].sigma_s, cases[i].reflectance, (float[3]){0.8f, 0.2f, -0.3f}, false,
                 rings);
         for (int r = 0; r < RINGS; ++r) {
-            print_message("sigma_s %g, reflectance %g, ring %d: %.2f %%\n", (double)cases[i].sigma_s,
-                          (double)cases[i].reflectance, r,
+            print_message("sigma_s %g, reflectance %g, ring %d: %.2f %%\n",
+                          (double)cases[i].sigma_s, (double)cases[i].reflectance, r,
                           100.0 * (rings[r].within / rings[r].coarse - 1.0));
             assert_close(rings[r].within, rings[r].coarse, 0.03);
         }
@@ -118,8 +119,8 @@ static void finer_within(void **state)
 
 /* --- The focus -------------------------------------------------------------------------------- */
 
-static uint64_t transports(brume_scene *scene, const brume_settings *settings, const float target[3],
-                           struct field *out)
+static uint64_t transports(brume_scene *scene, const brume_settings *settings,
+                           const float target[3], struct field *out)
 {
     const brume_view view = orthographic_view(target, (float[3]){0, 1, 0}, 0.5f, 0.5f, 4);
     brume_job *job = render(scene, settings, &view);
@@ -144,8 +145,8 @@ static void around_the_camera(void **state)
     /* The medium's middle, wherever the camera is. */
     const uint64_t first = transports(scene, &settings, (float[3]){-0.6f, 0, 0}, &there);
     assert_int_equal(transports(scene, &settings, (float[3]){0.6f, 0, 0}, &here), first);
-    const float middle = there.levels[1].lower.x + 0.5f * (float)there.levels[1].dims.x *
-                                                       there.levels[1].lower.w;
+    const float middle =
+        there.levels[1].lower.x + 0.5f * (float)there.levels[1].dims.x * there.levels[1].lower.w;
     assert_true(fabsf(middle - 0.4f) < 0.13f);
     /* The camera's own: its side does not come nearer than that to the lattice around. */
     settings.cascade_focus = BRUME_FOCUS_CAMERA;

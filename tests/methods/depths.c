@@ -512,8 +512,8 @@ static double true_depth(const struct gaussians *gaussians, const struct lattice
     return truth;
 }
 
-/* Mean error of the depths of all nodes and lamps over their mean depth, of every 23rd node, for each
- * way to find them. */
+/* Mean error of the depths of all nodes and lamps over their mean depth, of every 23rd node, for
+ * each way to find them. */
 static void gaussian_errors(const struct gaussians *gaussians, const brume_light *lamps,
                             uint32_t lamp_count, double errors[WAYS])
 {
@@ -536,9 +536,9 @@ static void gaussian_errors(const struct gaussians *gaussians, const brume_light
                 true_depth(gaussians, &lattices[0], &lattices[0].lights[i], node, &length);
             for (int c = 0; c < 3; ++c) {
                 for (uint32_t way = 0; way < WAYS; ++way)
-                    wrong[way] += fabs(depth_at(&lattices[way], &lattices[way].lights[i], node,
-                                                length, c) -
-                                       shares[c] * truth);
+                    wrong[way] +=
+                        fabs(depth_at(&lattices[way], &lattices[way].lights[i], node, length, c) -
+                             shares[c] * truth);
                 sum += shares[c] * truth;
             }
         }
@@ -637,12 +637,12 @@ static void what_ways_cost(void **state)
             if (round > 0)
                 best[way] = fmin(best[way], spent);
         }
-        as_held = round > 0 && best[2] > 4.0 * best[0] && best[2] > best[1] &&
-                  best[3] < 1.5 * best[2];
+        as_held =
+            round > 0 && best[2] > 4.0 * best[0] && best[2] > best[1] && best[3] < 1.5 * best[2];
     }
     print_message(
-        "ms at 40^3, one lamp and four: bricks %.1f and %.1f, as published %.0f and %.0f\n", best[0],
-        best[1], best[2], best[3]);
+        "ms at 40^3, one lamp and four: bricks %.1f and %.1f, as published %.0f and %.0f\n",
+        best[0], best[1], best[2], best[3]);
     brume_scene_destroy(scene);
     assert_true(as_held);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What LPV's parts take, in lattices of 32 and of 64 cells, as the rows of its paper's Table 1. Ratios
- * alone: the least of several rounds, for other work on the machine only adds. */
+/* What LPV's parts take, in lattices of 32 and of 64 cells, as the rows of its paper's Table 1.
+ * Ratios alone: the least of several rounds, for other work on the machine only adds. */
 #include "field.h"
 
 #define WATTS 100.0f
@@ -17,7 +17,8 @@ static double injection(const struct cost *cost)
 }
 
 /* Of a frame in which a lamp has moved; the least of each part so far. */
-static void run(brume_scene *scene, brume_settings settings, const float lamp[3], struct cost *least)
+static void run(brume_scene *scene, brume_settings settings, const float lamp[3],
+                struct cost *least)
 {
     const brume_view view = orthographic_view(origin, (float[3]){0, 0, -1}, 1.0f, 5.0f, 8);
     add_lamp(scene, 3, lamp, WATTS);
@@ -85,8 +86,8 @@ static void by_cells(void **state)
     }
 }
 
-/* The paper's worst case, all of a lamp's light in one cell: a lamp in a box as small as that, whose
- * reflected light all goes to one cell and whose way through the medium is in one. */
+/* The paper's worst case, all of a lamp's light in one cell: a lamp in a box as small as that,
+ * whose reflected light all goes to one cell and whose way through the medium is in one. */
 static void all_in_one_cell(void **state)
 {
     (void)state;

@@ -165,7 +165,7 @@ def lpv_hard(name):
                   "settings": {"method": 'LPV', "blockers": 'LINKS', "iterations": 0, **settings}}
                  for settings in brume]
         jobs.append({"camera": camera, "engine": 'CYCLES',
-                     "settings": {**lpv.CYCLES, "samples": 768}})
+                     "settings": {**lpv.CYCLES, "samples": 384}})
     pictures = lpv.run(lpv.Case("partition", 0), jobs)
     dark, lit = exposure_of(pictures[1]), exposure_of(pictures[3])
     sheet(name, pictures, 3, [dark] * 3 + [lit] * 3)

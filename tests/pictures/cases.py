@@ -89,5 +89,5 @@ CASES = {case.name: case for case in (
     Case('cube', (), 0.05, 512, zoom=1.4, method='LPV'),
     Case('cloud', (), 0.07, 512, zoom=1.15, method='LPV'),
     Case('room', (), 0.10, 2048, method='LPV'),
-    Case('room_smoke', (), 0.10, 512, method='LPV'),
+    Case('room_smoke', (), 0.10, 1024, method='LPV'),
 )}

@@ -57,7 +57,6 @@ def light_propagation():
     scene = bpy.context.scene
     lamp = lamp_behind_a_screen()
     scene.brume.method = 'LPV'
-    scene.brume.samples = scene.brume.viewport_samples = 2
     scene.brume.step = 16.0  # a room full of fog takes its time; the grain is the render's too
     area, region = yield from alone_rendered()
     first = shown(region)

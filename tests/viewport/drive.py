@@ -14,6 +14,10 @@ import bpy
 from brume import session, viewport
 
 SIZE = 640, 360  # of a view alone
+# Of views and of the final renders that they are compared with, which mostly have the same pixels
+# and so the same noise: samples, that a picture gathers; directions of the world, more than the
+# eight that rough pictures take.
+SAMPLES, WORLD_SAMPLES = 2, 16
 # Keys that xdotool would press together with Alt: in the keyboard maps of newer X servers they have
 # several levels, all alike.
 KEYCODES = {"F12": 96, "KP_Divide": 106}

@@ -23,8 +23,10 @@ from drive import (
 from views import alone, from_the_front
 
 ORBIT_S = 6.0
-IDLE_AFTER_S, IDLE_S = 5.0, 5.0
-MOVES = 6
+# Figures need more than what is asserted on any machine.
+SLOW = os.environ.get("BRUME_SLOW") == "1"
+IDLE_AFTER_S, IDLE_S = (5.0, 5.0) if SLOW else (1.0, 3.0)
+MOVES = 6 if SLOW else 2
 MOST_HOLD_MS, MOST_IDLE, LEAST_RATIO = 30.0, 0.02, 2.0
 
 
@@ -130,7 +132,7 @@ def time_until_shown(change, shows):
 def first_pictures():
     """Seconds until there is a picture: the first time, then when all is loaded."""
     found = []
-    for _ in range(3):
+    for _ in range(3 if SLOW else 2):
         found.append((yield from time_until_shown(lambda: shade('RENDERED'),
                                                   lambda values: values["picture"] > 0)))
         yield from settled()
@@ -174,6 +176,9 @@ def idle():
 def smooth():
     """All figures. That Brume shows twice as many pictures as EEVEE is asserted on any machine; how
     long it holds Blender, and what it takes at rest, where all scenarios are played."""
+    bpy.context.scene.brume.preset = 'DRAFT'  # as it is: what is asserted was found with that
+    if SLOW:
+        bpy.context.scene.brume.viewport_samples = 4
     area = yield from alone()
     from_the_front(area)
     region, = regions(area)
@@ -191,7 +196,7 @@ def smooth():
     found["ratio"] = found["brume"]["pictures_per_s"] / found["eevee"]["pictures_per_s"]
     print(found)
     assert found["ratio"] >= LEAST_RATIO, found
-    if os.environ.get("BRUME_SLOW") == "1":
+    if SLOW:
         assert found["idle"] < MOST_IDLE, found
         assert found["brume"]["hold"]["p99_ms"] < MOST_HOLD_MS, found
     return found

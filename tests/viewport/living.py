@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 from drive import (
     EEVEE,
+    SAMPLES,
     alone,
     at,
     bare,
@@ -47,7 +48,7 @@ def working(area=None):
 
 def rest():
     """Ends what working() began, and waits for it."""
-    bpy.context.scene.brume.viewport_samples = 4
+    bpy.context.scene.brume.viewport_samples = SAMPLES
     yield from settled()
 
 
@@ -121,7 +122,7 @@ def disabled_and_enabled():
     scene = bpy.context.scene
     scene.render.engine = 'BRUME'
     scene.brume.preset = 'DRAFT'
-    scene.brume.samples = scene.brume.viewport_samples = 4
+    scene.brume.samples = scene.brume.viewport_samples = SAMPLES
     yield from rendered_views()
     return as_camera_sees(region, "enabled again")
 
@@ -198,7 +199,7 @@ def final_render_beside():
     shade('RENDERED')
     yield pictured()
     waited = yield from escaped(region)
-    scene.brume.samples = 4
+    scene.brume.samples = SAMPLES
     yield from f12()
     yield from rest()
     found = as_camera_sees(region, "beside a render")
@@ -220,7 +221,7 @@ def f12_in_the_window():
     yield heard("render_pre", begun + 1)
     yield 2.0
     waited = yield from escaped(region)
-    scene.brume.samples = 4
+    scene.brume.samples = SAMPLES
     yield from f12()
     picture = saved_render()
     something(picture)

@@ -45,7 +45,8 @@ def prepare(scene_name):
     scene.render.resolution_percentage = 100
     scene.render.resolution_x, scene.render.resolution_y = 480, 270
     scene.brume.preset = 'DRAFT'
-    scene.brume.samples = scene.brume.viewport_samples = 4
+    scene.brume.samples = scene.brume.viewport_samples = drive.SAMPLES
+    scene.brume.world_samples = drive.WORLD_SAMPLES
     drive.events.clear()
     yield 0.1
 

@@ -3,7 +3,7 @@
 and orthographic."""
 
 import bpy
-from drive import alone, look_through_camera, regions, rendered_views, scenario, settled
+from drive import SAMPLES, alone, look_through_camera, regions, rendered_views, scenario, settled
 from eyes import as_camera_sees, as_rendered
 
 
@@ -18,6 +18,7 @@ def compared():
     look_through_camera()
     yield from rendered_views()
     found = {"CAMERA": as_camera_sees(region, "camera view")}
+    settings.samples = settings.viewport_samples = SAMPLES
     for kind in ('PERSP', 'ORTHO'):
         view.view_perspective = kind
         area.spaces.active.lens = 50.0

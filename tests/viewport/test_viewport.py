@@ -12,7 +12,7 @@ import os
 import launch
 import pytest
 
-THEMES = "seen", "views", "colour", "living", "playback", "edits", "latency"
+THEMES = "seen", "views", "methods", "colour", "living", "playback", "edits", "latency"
 SLOW = os.environ.get("BRUME_SLOW") == "1"
 QUIT_AFTER_S = 0.0, 0.3, 1.0, 3.0
 

@@ -223,7 +223,7 @@ PART_NAMES = {'surfaces': 'links that surfaces cut', 'media': 'media of cells',
 def lpv_parts_page(lines):
     line = lines[-1]
     kinds, sizes = list(line['parts']), list(line['parts']['LINKS'])
-    yield (f'{line["device"]}; commit {version(line)}. Milliseconds, the least of '
+    yield (f'{line["device"]}; commit {version(line)}. Milliseconds, medians of '
            f'{line["repeats"]} frames.')
     yield ''
     yield row('', *(f'{"exact" if kind == "LINKS" else "fuzzy"} blockers, {size}³'

@@ -75,8 +75,8 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
     }
 }
 
-// All that a cell begins with, and its power.
-float begin(ivec3 cell)
+// All that a cell begins with.
+void begin(ivec3 cell)
 {
     float side = level.lower.w;
     ivec2 texel = tiled_texel(cell, level.dims.xyz, stage.offset.y);
@@ -94,16 +94,17 @@ float begin(ivec3 cell)
             add_scattered(flow, p, part, start + uint(i));
         }
     }
-    float power = 0.0;
+    vec3 power;
     for (int c = 0; c < 3; ++c) {
         imageStore(flow_image[c], cell, lobe_of(flow[c]));
-        power += max(flow[c].x, 0.0);
+        power[c] = max(flow[c].x, 0.0);
     }
-    return power;
+    tell_power(cell, power);
 }
 
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
-    sum_power(in_level(cell) && cell.z < stage.slab.w ? begin(cell) : 0.0);
+    if (in_level(cell) && cell.z < stage.slab.w)
+        begin(cell);
 }

@@ -16,15 +16,9 @@
 #define CONVERGED 0.003
 #define SMALL_REST 0.1
 
-static int groups(int cells, int group)
+static size_t cell_count(const ivec4 *dims)
 {
-    return (cells + group - 1) / group;
-}
-
-static uint32_t group_count(const ivec4 *dims)
-{
-    return (uint32_t)(groups(dims->x, GROUP_LANES) * groups(dims->y, GROUP_CELLS) *
-                      groups(dims->z, GROUP_CELLS));
+    return (size_t)dims->x * (size_t)dims->y * (size_t)dims->z;
 }
 
 static brume_result lattice_texture(struct lpv_work *work, struct texture *texture, GLenum format,
@@ -54,7 +48,7 @@ static brume_result make(struct lpv_work *work)
                          texture_side(rows * dims.y), 1, 1, "reflected light"));
     }
     TRY(buffer_init(&work->input->gpu->memory, &work->powers, FOR_TRANSPORT,
-                    group_count(&dims) * sizeof(float), NULL, "powers in flight"));
+                    cell_count(&dims) * sizeof(float), NULL, "powers in flight"));
     TRY(texture_init(&work->input->gpu->memory, &work->links, FOR_TRANSPORT, GL_TEXTURE_3D,
                      GL_R32UI, texture_side(dims.x + 2), texture_side(dims.y + 2),
                      texture_side(dims.z + 2), 1, "cut links")); /* of the cells around, too */
@@ -128,14 +122,14 @@ static brume_result fill_cells(struct lpv_work *work)
 /* What the last iteration left in flight, W of all colours. */
 static brume_result in_flight(struct lpv_work *work, double *power)
 {
-    const uint32_t count = group_count(&work->field->dims);
+    const size_t count = cell_count(&work->field->dims);
     float *parts = malloc(count * sizeof *parts);
     if (!parts)
-        return fail(BRUME_E_MEMORY, "no memory for %u sums", count);
+        return fail(BRUME_E_MEMORY, "no memory for %zu powers", count);
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     glGetNamedBufferSubData(work->powers.id, 0, (GLsizeiptr)(count * sizeof *parts), parts);
     *power = 0.0;
-    for (uint32_t i = 0; i < count; ++i)
+    for (size_t i = 0; i < count; ++i)
         *power += (double)parts[i];
     free(parts);
     return BRUME_OK;

@@ -33,8 +33,8 @@ vec4 lobe_of(vec4 flow)
     vec4 lobe = vec4(1.0, axis * sharpness);
     float sum = 0.0;
     for (int i = 0; i < 13; ++i) {
-        vec3 direction = vec3(LINKS[i]) / link_length(i);
-        sum += leaving(lobe, link_class(i), direction) + leaving(lobe, link_class(i), -direction);
+        float forwards = exp(dot(lobe.yzw, vec3(LINKS[i])) / link_length(i));
+        sum += WEIGHTS[link_class(i)] * (forwards + 1.0 / forwards);
     }
     lobe.x = flow.x / sum;
     return lobe;

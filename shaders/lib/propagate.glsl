@@ -11,7 +11,7 @@ layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GR
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
-    gpu_lattice_pass stage; // offset.x: 1 sums what is in flight; y: a float: what the
+    gpu_lattice_pass stage; // offset.x: 1 tells what is in flight; y: a float: what the
                             // light of this iteration counts in the field; z: 1: there is a
                             // lattice around this one
 };
@@ -81,65 +81,63 @@ vec3 leave_around(ivec3 cell, int class_, vec3 direction, vec3 extinct)
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
-    vec3 in_flight = vec3(0.0);
-    if (in_level(cell) && cell.z < stage.slab.w) {
-        float side = level.lower.w;
-        vec3 extinct = texelFetch(cell_extinct, cell, 0).rgb;
-        vec3 albedo = texelFetch(cell_albedo, cell, 0).rgb;
-        vec3 wall = texelFetch(cell_walls, cell, 0).rgb;
-        cell_blockers own_blockers = blockers_of(cell);
-        vec4 own[3];
-        for (int c = 0; c < 3; ++c)
-            own[c] = texelFetch(flow_before[c], cell, 0);
-        gathered sum = gathered(vec3(0.0), mat3(0.0), vec3(0.0), mat3(0.0));
-        for (int number = 0; number < 26; ++number) {
-            int i = number % 13;
-            ivec3 link = number < 13 ? LINKS[i] : -LINKS[i];
-            int class_ = link_class(i);
-            float way = 0.5 * side * link_length(i);
-            vec3 direction = vec3(link) / link_length(i);
-            ivec3 beyond = cell + link;
-            bool there = in_level(beyond);
-            half_way mine = fly(extinct, way);
+    if (!in_level(cell) || cell.z >= stage.slab.w)
+        return;
+    float side = level.lower.w;
+    vec3 extinct = texelFetch(cell_extinct, cell, 0).rgb;
+    vec3 albedo = texelFetch(cell_albedo, cell, 0).rgb;
+    vec3 wall = texelFetch(cell_walls, cell, 0).rgb;
+    cell_blockers own_blockers = blockers_of(cell);
+    vec4 own[3];
+    for (int c = 0; c < 3; ++c)
+        own[c] = texelFetch(flow_before[c], cell, 0);
+    gathered sum = gathered(vec3(0.0), mat3(0.0), vec3(0.0), mat3(0.0));
+    for (int number = 0; number < 26; ++number) {
+        int i = number % 13;
+        ivec3 link = number < 13 ? LINKS[i] : -LINKS[i];
+        int class_ = link_class(i);
+        float way = 0.5 * side * link_length(i);
+        vec3 direction = vec3(link) / link_length(i);
+        ivec3 beyond = cell + link;
+        bool there = in_level(beyond);
+        half_way mine = fly(extinct, way);
 
-            vec3 out_ = vec3(leaving(own[0], class_, direction), leaving(own[1], class_, direction),
-                             leaving(own[2], class_, direction));
-            sum.power += out_ * (1.0 - mine.through) * albedo;
-            sum.passed += out_ * mine.mean;
-            add_flux(sum.passed_flux, out_ * mine.mean, direction);
+        vec3 out_ = vec3(leaving(own[0], class_, direction), leaving(own[1], class_, direction),
+                         leaving(own[2], class_, direction));
+        sum.power += out_ * (1.0 - mine.through) * albedo;
+        sum.passed += out_ * mine.mean;
+        add_flux(sum.passed_flux, out_ * mine.mean, direction);
 
-            link_blockers shares = blockers_between(own_blockers, beyond, number, there);
-            vec3 begins = vec3(0.0);
-            vec3 lobes = vec3(0.0); // the same, times their mean cosines to the link
-            if (shares.there > 0.0) {
-                begins = out_ * mine.through * wall * shares.there;
-                lobes = begins * (2.0 / 3.0);
-            }
-            if (shares.back < 1.0 && (there || stage.offset.z != 0)) {
-                vec3 comes = 1.0 - vec3(shares.back);
-                if (there)
-                    comes *= leave(flow_before, beyond, class_, -direction) *
-                             fly(texelFetch(cell_extinct, beyond, 0).rgb, way).through;
-                else
-                    comes *= leave_around(beyond, class_, -direction, extinct) * mine.through;
-                begins += comes;
-                lobes += comes;
-            }
-            vec3 arrives = begins * mine.through;
-            sum.power += arrives + (begins - arrives) * albedo;
-            add_flux(sum.flux, lobes * mine.through, -direction);
-            sum.passed += begins * mine.mean;
-            add_flux(sum.passed_flux, lobes * mine.mean, -direction);
+        link_blockers shares = blockers_between(own_blockers, beyond, number, there);
+        vec3 begins = vec3(0.0);
+        vec3 lobes = vec3(0.0); // the same, times their mean cosines to the link
+        if (shares.there > 0.0) {
+            begins = out_ * mine.through * wall * shares.there;
+            lobes = begins * (2.0 / 3.0);
         }
-        float counts = intBitsToFloat(stage.offset.y) / (side * side * side);
-        for (int c = 0; c < 3; ++c) {
-            vec4 field = imageLoad(field_image[c], cell);
-            field += vec4(sum.passed[c], sum.passed_flux[c]) * counts;
-            imageStore(field_image[c], cell, field);
-            imageStore(flow_image[c], cell, lobe_of(vec4(sum.power[c], sum.flux[c])));
+        if (shares.back < 1.0 && (there || stage.offset.z != 0)) {
+            vec3 comes = 1.0 - vec3(shares.back);
+            if (there)
+                comes *= leave(flow_before, beyond, class_, -direction) *
+                         fly(texelFetch(cell_extinct, beyond, 0).rgb, way).through;
+            else
+                comes *= leave_around(beyond, class_, -direction, extinct) * mine.through;
+            begins += comes;
+            lobes += comes;
         }
-        in_flight = sum.power;
+        vec3 arrives = begins * mine.through;
+        sum.power += arrives + (begins - arrives) * albedo;
+        add_flux(sum.flux, lobes * mine.through, -direction);
+        sum.passed += begins * mine.mean;
+        add_flux(sum.passed_flux, lobes * mine.mean, -direction);
+    }
+    float counts = intBitsToFloat(stage.offset.y) / (side * side * side);
+    for (int c = 0; c < 3; ++c) {
+        vec4 field = imageLoad(field_image[c], cell);
+        field += vec4(sum.passed[c], sum.passed_flux[c]) * counts;
+        imageStore(field_image[c], cell, field);
+        imageStore(flow_image[c], cell, lobe_of(vec4(sum.power[c], sum.flux[c])));
     }
     if (stage.offset.x != 0)
-        sum_power(in_flight.r + in_flight.g + in_flight.b);
+        tell_power(cell, sum.power);
 }

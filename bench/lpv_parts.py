@@ -45,7 +45,7 @@ def render(box, cells, blockers, half_march=False):
 def parts(box, cells, blockers, repeats):
     frames = []
     for number in range(repeats + 1):
-        box.move_lights(2, cast_shadow=True)
+        box.move_lights(2)
         stats = render(box, cells, blockers)
         if number:  # the first compiles
             frames.append(list(stats.field_ms))

@@ -96,12 +96,12 @@ class Box:
         self.scene.set_volume(1, name='fog', program=PROGRAM, world_from_object=np.eye(4),
                               gaussians=terms)
 
-    def move_lights(self, count, cast_shadow=False):
+    def move_lights(self, count):
         for key in range(1, count + 1):
             place = np.eye(4)
             place[:3, 3] = self.place_lots.uniform(-0.8, 0.8, 3)
             self.scene.set_light(key, name='lamp', type='POINT', world_from_light=place,
-                                 power=(20.0 / count,) * 3, cast_shadow=cast_shadow)
+                                 power=(20.0 / count,) * 3, cast_shadow=False)
 
     def render(self, size, depths='PROPAGATED'):
         settings = native.Settings(

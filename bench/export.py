@@ -5,7 +5,6 @@ to out/bench/export.jsonl:
     scripts/blender -b --factory-startup -P bench/export.py
 """
 
-import json
 import sys
 import time
 from pathlib import Path
@@ -17,7 +16,7 @@ from brume.export import changes, scene
 from brume.export.target import Target
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from place import ROOT, here
+from place import here, keep
 
 OBJECTS, MESHES, SIDE, INSTANCES = 1000, 100, 224, 20000
 REPEATS = 5
@@ -112,11 +111,7 @@ def main():
         line["export_ms"][case] = measure(target, listener)
         target.scene.close()
     device.close()
-    path = Path(ROOT) / "out" / "bench" / "export.jsonl"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a", encoding="utf-8") as file:
-        print(json.dumps(line), file=file)
-    print(json.dumps(line))
+    keep(line)
 
 
 main()

@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from opv import native
-from place import ROOT, here
+from place import ROOT, here, keep
 
 sys.path.insert(0, os.path.join(ROOT, 'tests', 'pictures'))
 import compare
@@ -32,7 +32,7 @@ REFERENCES = os.path.join(ROOT, 'build', 'references')
 OUT = os.path.join(ROOT, 'out', 'bench')
 PATHS = ('DIRECT', 'REFLECTED', 'SINGLE', 'REFLECTED_MARCHED', 'SUM', 'ALL')
 CELLS = 32
-FINER = 64  # of ALL alone, as cascades
+FINER = 64  # of ALL alone, as are cascades
 SIZE = 256
 NOISE = 0.01
 # All light: as many bounces as matter, nothing clamped, nothing smoothed.
@@ -135,9 +135,7 @@ def main():
     line = {'bench': 'lpv', **here(), 'device': native.Device().describe().renderer.decode(),
             'resolution': [SIZE, SIZE], 'cells': CELLS, 'finer': FINER,
             'scenes': {name: measure(CASES[name], options.pairs) for name in options.scenes}}
-    with open(os.path.join(OUT, 'lpv.jsonl'), 'a', encoding='utf-8') as file:
-        file.write(json.dumps(line) + '\n')
-    print(json.dumps(line, indent=1))
+    keep(line)
 
 
 if __name__ == '__main__':

@@ -9,7 +9,6 @@ The box of bench/opv.py: 16 Gaussians between a floor and two walls, two moving 
 frames, by the GL's timer.
 """
 import argparse
-import json
 import os
 import sys
 
@@ -17,7 +16,7 @@ import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from opv import Box, native, view
-from place import ROOT, here
+from place import here, keep
 
 SIZES = (32, 64)
 ITERATIONS = 8
@@ -70,11 +69,7 @@ def main():
                                  for size in SIZES} for blockers in native.BLOCKERS},
             'march': marches(box, options.repeats)}
     box.close()
-    folder = os.path.join(ROOT, 'out', 'bench')
-    os.makedirs(folder, exist_ok=True)
-    with open(os.path.join(folder, 'lpv_parts.jsonl'), 'a', encoding='utf-8') as file:
-        file.write(json.dumps(line) + '\n')
-    print(json.dumps(line, indent=1))
+    keep(line)
 
 
 if __name__ == '__main__':

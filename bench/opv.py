@@ -10,7 +10,6 @@ sample each. Frames are medians, propagation (the stage "transport") the best of
 
 import argparse
 import importlib.util
-import json
 import os
 import sys
 from functools import partial
@@ -19,7 +18,7 @@ from types import SimpleNamespace
 import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from place import ROOT, here
+from place import ROOT, here, keep
 
 
 def _native():
@@ -193,12 +192,7 @@ def main():
     line['table_3'] = table_3(device, options.repeats)
     line['ways'] = ways(device, max(options.repeats // 2, 2))
     line['many'] = many(device)
-    folder = os.path.join(ROOT, 'out', 'bench')
-    os.makedirs(folder, exist_ok=True)
-    text = json.dumps(line)
-    with open(os.path.join(folder, 'opv.jsonl'), 'a', encoding='utf-8') as file:
-        file.write(text + '\n')
-    print(json.dumps(line, indent=1))
+    keep(line)
 
 
 if __name__ == '__main__':

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Of what, when and on what a benchmark's line was measured."""
+"""Of what, when and on what a benchmark's line was measured; and where lines are kept."""
 
+import json
 import os
 import platform
 import subprocess
@@ -28,3 +29,12 @@ def here():
             'time': datetime.now(timezone.utc).isoformat(timespec='seconds'),
             'processor': _processor(), 'threads': len(os.sched_getaffinity(0)),
             'load': os.getloadavg()[0]}
+
+
+def keep(line):
+    """Appends it to out/bench/NAME.jsonl, by its "bench", and prints it."""
+    folder = os.path.join(ROOT, 'out', 'bench')
+    os.makedirs(folder, exist_ok=True)
+    with open(os.path.join(folder, f'{line["bench"]}.jsonl'), 'a', encoding='utf-8') as file:
+        file.write(json.dumps(line) + '\n')
+    print(json.dumps(line, indent=1))

@@ -138,25 +138,10 @@ static void add_lamp(brume_scene *scene, uint64_t key, const float from[3], floa
 static void add_box_at(brume_scene *scene, uint64_t key, const float middle[3], float half,
                        float reflectance)
 {
-    const brume_material material = {
-        .diffuse = {reflectance, reflectance, reflectance}, .roughness = 1, .alpha = 1};
     float positions[24];
     uint32_t triangles[36];
     cube_mesh(middle, half, positions, triangles);
-    const brume_mesh mesh = {.name = "box",
-                             .positions = positions,
-                             .triangles = triangles,
-                             .materials = &key,
-                             .vertex_count = 8,
-                             .triangle_count = 12,
-                             .material_count = 1};
-    const brume_instances instances = {.world_from_object = identity,
-                                       .mesh = key,
-                                       .count = 1,
-                                       .visibility = BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW};
-    assert_ok(brume_scene_set_material(scene, key, &material));
-    assert_ok(brume_scene_set_mesh(scene, key, &mesh));
-    assert_ok(brume_scene_set_instances(scene, key, &instances));
+    add_matt(scene, key, "box", reflectance, identity, positions, 8, triangles, 12);
 }
 
 /* The same around the origin. */

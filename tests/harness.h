@@ -200,7 +200,30 @@ static brume_light point_lamp(const float from[3], float watts)
     return lamp;
 }
 
-/* A white matt square of that side, across a direction: mesh, material and instances of the key. */
+/* Grey matt triangles, seen and casting shadows: mesh, material and instances of the key. */
+static void add_matt(brume_scene *scene, uint64_t key, const char *name, float reflectance,
+                     const float matrix[16], const float *positions, uint32_t vertices,
+                     const uint32_t *triangles, uint32_t triangle_count)
+{
+    const brume_material material = {
+        .diffuse = {reflectance, reflectance, reflectance}, .roughness = 1, .alpha = 1};
+    const brume_mesh mesh = {.name = name,
+                             .positions = positions,
+                             .triangles = triangles,
+                             .materials = &key,
+                             .vertex_count = vertices,
+                             .triangle_count = triangle_count,
+                             .material_count = 1};
+    const brume_instances instances = {.world_from_object = matrix,
+                                       .mesh = key,
+                                       .count = 1,
+                                       .visibility = BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW};
+    assert_ok(brume_scene_set_material(scene, key, &material));
+    assert_ok(brume_scene_set_mesh(scene, key, &mesh));
+    assert_ok(brume_scene_set_instances(scene, key, &instances));
+}
+
+/* A white matt square of that side, across a direction. */
 static void add_plate(brume_scene *scene, uint64_t key, const float center[3],
                       const float direction[3], float side)
 {
@@ -209,15 +232,7 @@ static void add_plate(brume_scene *scene, uint64_t key, const float center[3],
     const float square[12] = {-h, -h, 0, h, -h, 0, h, h, 0, -h, h, 0};
     float matrix[16];
     placed(center, direction, matrix);
-    const brume_material white = {.diffuse = {1, 1, 1}, .roughness = 1, .alpha = 1};
-    const brume_mesh mesh = {.name = "plate", .positions = square, .triangles = triangles,
-                             .materials = &key, .vertex_count = 4, .triangle_count = 2,
-                             .material_count = 1};
-    const brume_instances instances = {.world_from_object = matrix, .mesh = key, .count = 1,
-                                       .visibility = BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW};
-    assert_ok(brume_scene_set_material(scene, key, &white));
-    assert_ok(brume_scene_set_mesh(scene, key, &mesh));
-    assert_ok(brume_scene_set_instances(scene, key, &instances));
+    add_matt(scene, key, "plate", 1.0f, matrix, square, 4, triangles, 2);
 }
 
 /* The inverse of a rigid matrix. */

@@ -221,14 +221,6 @@ static struct box field_box(const struct renderer *renderer, const struct snapsh
     return box;
 }
 
-static void box_of(const struct gpu_field *field, struct box *box)
-{
-    for (int i = 0; i < 3; ++i) {
-        box->lower[i] = (&field->lower.x)[i];
-        box->upper[i] = box->lower[i] + (float)(&field->dims.x)[i] * field->lower.w;
-    }
-}
-
 /* The box in the middle, and along its longest side nothing but it: walls, which are often its sides,
  * are where cells end. */
 static struct gpu_field whole_field(const struct box *box, int resolution)
@@ -303,10 +295,8 @@ static int layout_field(struct renderer *renderer, const struct render_request *
     for (;; resolution = resolution * 3 / 4) {
         frame->fields[0] = whole_field(&box, resolution);
         for (int i = 1; i < settings->cascades; ++i) {
-            struct box around;
             float focus[3];
-            box_of(&frame->fields[i - 1], &around);
-            focus_of(renderer, request, 0.5f * longest(&around), focus);
+            focus_of(renderer, request, ldexpf(longest(&box), -i), focus);
             frame->fields[i] = field_within(&frame->fields[i - 1], focus);
         }
         if (field_bytes(settings, frame->fields) <= renderer->shares.field ||

@@ -273,7 +273,8 @@ static brume_result look_around(struct lpv_work *work)
     bind_level(work);
     glBindImageTexture(SLOT_OUTPUT, work->cells_around.id, 0, GL_TRUE, 0, GL_WRITE_ONLY,
                        GL_RGBA8UI);
-    TRY(lpv_over_lattice(work, "lpv_around", (ivec4){work->around->number, 0, 0, 0}, &more));
+    const int around = (int)(work->around->field - work->input->frame->fields);
+    TRY(lpv_over_lattice(work, "lpv_around", (ivec4){around, 0, 0, 0}, &more));
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     return BRUME_OK;
 }
@@ -338,7 +339,6 @@ brume_result lpv_run(struct transport *transport, const struct transport_input *
         works[i] = (struct lpv_work){
             .input = input,
             .field = &input->frame->fields[i],
-            .number = i,
             .around = i ? &works[i - 1] : NULL,
             .within = i + 1 < levels ? &works[i + 1] : NULL,
             .product = &transport->field,

@@ -27,7 +27,6 @@ struct lpv_fuzzy {
 struct lpv_work {
     const struct transport_input *input;
     const struct gpu_field *field;  /* the lattice, of the frame */
-    int number;                     /* of it there: 0 the whole */
     struct buffer level;            /* the same for shaders */
     struct lpv_work *around, *within; /* those of the lattices next to it, or NULL */
     const struct texture *product;  /* where the light of all lattices goes in the end */

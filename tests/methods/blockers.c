@@ -8,6 +8,7 @@
 #define HALF 1.0f    /* of the box's side, m */
 #define FOG 0.25f    /* the same, of the fog on either side */
 #define BESIDE 0.55f /* from the wall to the fog's middle */
+#define GREY 0.5f    /* reflectance of box and wall */
 #define PIXELS 8
 
 static const struct coefficients thin = {.sigma_s = {0.3f, 0.3f, 0.3f}};
@@ -27,26 +28,6 @@ static const struct wall walls[] = {
     {"a cell thick", 30, 1},
 };
 
-static void add_surface(brume_scene *scene, uint64_t key, const float *positions, uint32_t vertices,
-                        const uint32_t *triangles, uint32_t triangle_count)
-{
-    const brume_material grey = {.diffuse = {0.5f, 0.5f, 0.5f}, .roughness = 1, .alpha = 1};
-    const brume_mesh mesh = {.name = "wall",
-                             .positions = positions,
-                             .triangles = triangles,
-                             .materials = &key,
-                             .vertex_count = vertices,
-                             .triangle_count = triangle_count,
-                             .material_count = 1};
-    const brume_instances instances = {.world_from_object = identity,
-                                       .mesh = key,
-                                       .count = 1,
-                                       .visibility = BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW};
-    assert_ok(brume_scene_set_material(scene, key, &grey));
-    assert_ok(brume_scene_set_mesh(scene, key, &mesh));
-    assert_ok(brume_scene_set_instances(scene, key, &instances));
-}
-
 /* Upright, at that distance from the middle along the normal, and a little through the box. */
 static void add_sheet(brume_scene *scene, uint64_t key, const float normal[2], float distance)
 {
@@ -59,7 +40,7 @@ static void add_sheet(brume_scene *scene, uint64_t key, const float normal[2], f
         positions[3 * i + 1] = y;
         positions[3 * i + 2] = i >= 2 ? reach : -reach;
     }
-    add_surface(scene, key, positions, 4, triangles, 2);
+    add_matt(scene, key, "wall", GREY, identity, positions, 4, triangles, 2);
 }
 
 /* With so many lamps in one place, that together send the same. */
@@ -75,7 +56,7 @@ static brume_scene *parted_box(const struct wall *wall, int resolution, uint64_t
     normal[1] = sinf(turn);
     assert_ok(brume_scene_create(device, &scene));
     cube_mesh(middle_, HALF, positions, triangles);
-    add_surface(scene, 1, positions, 8, triangles, 12);
+    add_matt(scene, 1, "wall", GREY, identity, positions, 8, triangles, 12);
     const float thickness = (float)wall->cells * 2.0f * HALF / (float)(resolution - 1);
     add_sheet(scene, 2, normal, -0.5f * thickness);
     if (wall->cells)

@@ -31,11 +31,11 @@ vec4 lobe_of(vec4 flow)
     // JMLR 2005, eq. 4.4, for three dimensions.
     float sharpness = cosine * (3.0 - cosine * cosine) / (1.0 - cosine * cosine);
     vec4 lobe = vec4(1.0, axis * sharpness);
-    float sum = 0.0;
-    for (int i = 0; i < 13; ++i) {
-        float forwards = exp(dot(lobe.yzw, vec3(LINKS[i])) / link_length(i));
-        sum += WEIGHTS[link_class(i)] * (forwards + 1.0 / forwards);
-    }
+    // exp(K u) over the links of a class, both ways: products, since exponents add up.
+    vec3 face = cosh(lobe.yzw), edge = cosh(lobe.yzw / sqrt(2.0)), corner = cosh(lobe.yzw / sqrt(3.0));
+    float sum = WEIGHTS[0] * 2.0 * (face.x + face.y + face.z) +
+                WEIGHTS[1] * 4.0 * dot(edge, edge.yzx) +
+                WEIGHTS[2] * 8.0 * corner.x * corner.y * corner.z;
     lobe.x = flow.x / sum;
     return lobe;
 }

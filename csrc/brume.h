@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* Raised by every change to a struct, an enumerator or a function below. */
-#define BRUME_ABI 5u
+#define BRUME_ABI 6u
 
 BRUME_API uint32_t brume_abi(void);
 
@@ -421,7 +421,8 @@ BRUME_API brume_result brume_scene_set_world(brume_scene *scene, const brume_wor
 typedef enum brume_method {
     BRUME_METHOD_OPV = 0,
     BRUME_METHOD_LPV = 1,
-    BRUME_METHOD_COUNT = 2
+    BRUME_METHOD_DOM = 2,
+    BRUME_METHOD_COUNT = 3
 } brume_method;
 
 /* How OPV finds the optical depths from the lamps to the nodes of its lattice. */
@@ -483,6 +484,8 @@ typedef struct brume_settings {
     int32_t cascades;                /* such lattices, each within the last, of half its length and as
                                         many cells; at most 3; 0: 1 */
     uint32_t cascade_focus;          /* brume_focus */
+    int32_t ordinates;               /* DOM: directions that light is carried along: 26, 48 or 96; 0: 48 */
+    uint32_t reserved;
     uint64_t memory_budget;          /* bytes on the GPU; 0: 2 GiB */
 } brume_settings;
 
@@ -577,6 +580,7 @@ typedef struct brume_stats {
     double power_begun;          /* W of all colours: what these began with in the whole lattice, */
     double power_in_flight;      /* and what the last one left there that had not left it or been
                                     absorbed */
+    double change;               /* DOM: of the radiance, what its last iteration changed */
     double field_ms[9];          /* by the GL's timer: brume_field_part */
 } brume_stats;
 

@@ -8,6 +8,7 @@
 #include "lib/sky.glsl"
 #include "lib/flow.glsl"
 #include "lib/level.glsl"
+#include "lib/spread.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
@@ -23,14 +24,6 @@ layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D flow_image[3];
 #include "lib/power.glsl"
 
 const int POINTS = 64; // along the lattice
-
-// The mean of 1/d^2 over a cube of that side around a point, to the second order (its Laplacian is
-// 2/d^4), and no more than over a cube around the lamp itself.
-float mean_inverse_square(float square, float side)
-{
-    float s = side * side;
-    return min((1.0 + s / (12.0 * square)) / square, 7.7 / s);
-}
 
 // What the media scatter in a cube of side `part` around a point, of the light of all lights.
 void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)

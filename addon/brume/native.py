@@ -27,14 +27,14 @@ from pathlib import Path
 
 import numpy as np
 
-ABI = 5
+ABI = 6
 PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONMENT",
           "TRANSMITTANCE", "VOLUME_INDIRECT")
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3, 3)
 STAGES = ("upload", "medium", "shadow", "transport", "gbuffer", "shade", "march", "passes")
 FIELD_PARTS = ("surfaces", "media", "reflected", "scattered", "blockers", "aggregate", "prepare",
                "iterations", "copy")
-METHODS = {"OPV": 0, "LPV": 1}
+METHODS = {"OPV": 0, "LPV": 1, "DOM": 2}
 LIGHT_PATHS = {"ALL": 0, "DIRECT": 1, "REFLECTED": 2, "SINGLE": 3, "REFLECTED_MARCHED": 4,
                "SUM": 5}
 BLOCKERS = {"LINKS": 0, "FUZZY": 1}
@@ -164,6 +164,7 @@ class Settings(Structure):
                 ("world_samples", c_int32), ("step", c_float), ("depths", c_uint32),
                 ("light_paths", c_uint32), ("blockers", c_uint32), ("field_resolution", c_int32),
                 ("cascades", c_int32), ("cascade_focus", c_uint32),
+                ("ordinates", c_int32), ("reserved", c_uint32),
                 ("memory_budget", c_uint64)]
 
 
@@ -189,7 +190,8 @@ class Stats(Structure):
                 ("samples", c_uint32), ("shadow_maps_drawn", c_uint32),
                 ("lights_propagated", c_uint32), ("sky_propagated", c_uint32),
                 ("iterations", c_uint32), ("power_begun", c_double),
-                ("power_in_flight", c_double), ("field_ms", c_double * 9)]
+                ("power_in_flight", c_double), ("change", c_double),
+                ("field_ms", c_double * 9)]
 
 
 class JobStatus(Structure):

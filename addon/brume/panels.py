@@ -76,7 +76,7 @@ class BRUME_PT_single_scattering(_Rows, _RenderPanel, bpy.types.Panel):
 
     @classmethod
     def applies(cls, context):
-        return context.scene.brume.method in {'OPV', 'LPV'}
+        return context.scene.brume.method in {'OPV', 'LPV', 'DOM'}
 
 
 class BRUME_PT_light_propagation(_Rows, _RenderPanel, bpy.types.Panel):
@@ -98,6 +98,16 @@ class BRUME_PT_light_propagation_comparison(_Rows, _RenderPanel, bpy.types.Panel
     @classmethod
     def applies(cls, context):
         return context.scene.brume.method == 'LPV'
+
+
+class BRUME_PT_discrete_ordinates(_Rows, _RenderPanel, bpy.types.Panel):
+    bl_label = "Discrete Ordinates"
+    bl_parent_id = "BRUME_PT_volumes"
+    rows = ("field_resolution", "ordinates", "iterations")
+
+    @classmethod
+    def applies(cls, context):
+        return context.scene.brume.method == 'DOM'
 
 
 class BRUME_PT_world_volume(_RenderPanel, bpy.types.Panel):
@@ -267,6 +277,7 @@ class BRUME_PT_light_nodes(_LightPanel, bpy.types.Panel):
 
 _CLASSES = (BRUME_PT_sampling, BRUME_PT_sampling_advanced, BRUME_PT_volumes,
             BRUME_PT_light_propagation, BRUME_PT_light_propagation_comparison,
+            BRUME_PT_discrete_ordinates,
             BRUME_PT_single_scattering, BRUME_PT_world_volume, BRUME_PT_lights, BRUME_PT_film,
             BRUME_PT_performance,
             BRUME_PT_passes, BRUME_PT_override, BRUME_PT_ray_visibility,

@@ -12,17 +12,20 @@ METHODS = [
     ('LPV', "Light Propagation",
      "Light that volumes scatter and surfaces reflect goes on from cell to cell, as often as it "
      "takes: fills rooms and clouds with light, softly", 1),
+    ('DOM', "Discrete Ordinates",
+     "Light goes along many directions, from cell to cell, until it has found its way: right to a "
+     "few percent, and the more so the more cells and directions there are", 2),
 ]
 
 PRESETS = {
     'DRAFT': {"samples": 4, "medium_resolution": 64, "lattice_resolution": 32,
-              "field_resolution": 16, "step": 4.0, "shadow_resolution": 256, "light_samples": 4,
-              "world_samples": 32},
+              "field_resolution": 16, "ordinates": '26', "step": 4.0, "shadow_resolution": 256,
+              "light_samples": 4, "world_samples": 32},
     'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64,
-                "field_resolution": 32, "step": 3.0, "shadow_resolution": 512, "light_samples": 8,
-                "world_samples": 128},
+                "field_resolution": 32, "ordinates": '48', "step": 3.0, "shadow_resolution": 512,
+                "light_samples": 8, "world_samples": 128},
     'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96,
-              "field_resolution": 64, "step": 1.0, "shadow_resolution": 1024,
+              "field_resolution": 64, "ordinates": '96', "step": 1.0, "shadow_resolution": 1024,
               "light_samples": 16, "world_samples": 256},
 }
 _DEFAULT = PRESETS['PREVIEW']
@@ -89,6 +92,14 @@ class BrumeSettings(bpy.types.PropertyGroup):
                     "light goes on. It is soft: fewer do than for the lights' own. More tell "
                     "smaller rooms and thicker smoke apart; memory grows with the third power, "
                     "time with the fourth where iterations go on until they converged")
+    ordinates: EnumProperty(
+        name="Directions", update=changed, default=_DEFAULT["ordinates"],
+        description="Directions that scattered and reflected light goes along. Time and memory "
+                    "grow in proportion",
+        items=[('26', "26", "Quick, for a first look: bright spots show as beams", 26),
+               ('48', "48", "For most scenes", 48),
+               ('96', "96", "For thin fog in rooms with small bright spots, and to see whether "
+                            "fewer would do", 96)])
     cascades: IntProperty(
         name="Cascades", update=changed, default=1, min=1, max=3,
         description="Lattices of scattered and reflected light, each within the last and half as "
@@ -249,6 +260,7 @@ def native_settings(settings):
         medium_resolution=settings.medium_resolution,
         lattice_resolution=settings.lattice_resolution,
         field_resolution=settings.field_resolution,
+        ordinates=int(settings.ordinates),
         cascades=settings.cascades, cascade_focus=native.FOCUS[settings.cascade_focus],
         iterations=settings.iterations,
         shadow_resolution=settings.shadow_resolution, light_samples=settings.light_samples,

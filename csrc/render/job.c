@@ -25,6 +25,7 @@ static brume_result check_settings(brume_settings *settings)
     set_default(&settings->lattice_resolution, 64);
     set_default(&settings->field_resolution, (settings->lattice_resolution + 1) / 2);
     set_default(&settings->cascades, 1);
+    set_default(&settings->ordinates, 48);
     set_default(&settings->shadow_resolution, 512);
     set_default(&settings->light_samples, 8);
     set_default(&settings->world_samples, 128);
@@ -37,6 +38,7 @@ static brume_result check_settings(brume_settings *settings)
     REQUIRE(settings->lattice_resolution >= 1 && settings->lattice_resolution <= 512);
     REQUIRE(settings->field_resolution >= 1 && settings->field_resolution <= 256);
     REQUIRE(settings->cascades >= 1 && settings->cascades <= FIELD_LEVELS);
+    REQUIRE(settings->ordinates == 26 || settings->ordinates == 48 || settings->ordinates == 96);
     REQUIRE(settings->cascade_focus < BRUME_FOCUS_COUNT);
     REQUIRE(settings->shadow_resolution >= 16 && settings->shadow_resolution <= 8192);
     REQUIRE(settings->light_samples >= 1 && settings->light_samples <= 1024);

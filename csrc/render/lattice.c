@@ -5,6 +5,7 @@
 #include "math/frame.h"
 #include "scene/pack.h"
 #include "transport/depths.h"
+#include "transport/dom.h"
 #include "transport/lpv.h"
 
 #include <math.h>
@@ -77,7 +78,7 @@ static struct box scene_box(const struct renderer *renderer, const struct snapsh
     return box;
 }
 
-static void layout_fog(struct renderer *renderer, const struct snapshot *snapshot)
+static void layout_fog(struct renderer *renderer, const struct snapshot *snapshot, uint32_t method)
 {
     struct gpu_frame *frame = &renderer->frame;
     const brume_world *world = &snapshot->world;
@@ -97,8 +98,9 @@ static void layout_fog(struct renderer *renderer, const struct snapshot *snapsho
         box.upper[i] += margin;
     }
     float sigma_t[3];
+    const float share = method == BRUME_METHOD_DOM ? medium_forward_share(world->g) : 0.0f;
     for (int c = 0; c < 3; ++c)
-        sigma_t[c] = world->sigma_s[c] + world->sigma_a[c];
+        sigma_t[c] = (1.0f - share) * world->sigma_s[c] + world->sigma_a[c];
     frame->fog_lower = pack(box.lower, 1.0f);
     frame->fog_upper = pack(box.upper, unlimited ? 1.0f : 0.0f);
     frame->fog_sigma_s = pack(world->sigma_s, world->g);
@@ -168,16 +170,27 @@ uint64_t lattice_sky_bytes(const brume_settings *settings)
 
 int lattice_wants_field(const brume_settings *settings)
 {
+    if (settings->method == BRUME_METHOD_DOM)
+        return 1;
     return settings->method == BRUME_METHOD_LPV && settings->light_paths != BRUME_PATHS_DIRECT &&
            settings->light_paths != BRUME_PATHS_SINGLE;
 }
 
+/* DOM has one as yet. */
+static int lattice_count(const brume_settings *settings)
+{
+    return settings->method == BRUME_METHOD_DOM ? 1 : settings->cascades;
+}
+
 static uint64_t field_bytes(const brume_settings *settings, const struct gpu_field *fields)
 {
-    const uint64_t each = FIELD_CELL_BYTES + FIELD_WORKING_BYTES +
-                          (settings->blockers == BRUME_BLOCKERS_FUZZY ? FIELD_FUZZY_BYTES : 0);
+    uint64_t each = FIELD_CELL_BYTES + FIELD_WORKING_BYTES +
+                    (settings->blockers == BRUME_BLOCKERS_FUZZY ? FIELD_FUZZY_BYTES : 0);
+    if (settings->method == BRUME_METHOD_DOM)
+        each = DOM_CELL_BYTES + DOM_WORKING_BYTES +
+               (uint64_t)settings->ordinates * DOM_ORDINATE_BYTES;
     uint64_t cells = 0;
-    for (int i = 0; i < settings->cascades; ++i)
+    for (int i = 0; i < lattice_count(settings); ++i)
         cells += (uint64_t)fields[i].dims.x * (uint64_t)fields[i].dims.y *
                  (uint64_t)fields[i].dims.z;
     return cells * each + FIELD_FIXED_BYTES;
@@ -201,7 +214,8 @@ static void box_cut(struct box *box, const float lower[3], const float upper[3])
 
 /* Where light goes to and fro: what is solid, the media, and what of flat geometry, such as the
  * ground, is around them. With the world's medium, all that the scene shows. */
-static struct box field_box(const struct renderer *renderer, const struct snapshot *snapshot)
+static struct box field_box(const struct renderer *renderer, const struct snapshot *snapshot,
+                            uint32_t method)
 {
     const struct geometry *geometry = &renderer->geometry;
     const int fog = renderer->frame.fog_lower.w != 0.0f;
@@ -211,6 +225,10 @@ static struct box field_box(const struct renderer *renderer, const struct snapsh
         box_join(&box, geometry->solid_lower, geometry->solid_upper);
     if (medium->dims[0])
         box_join(&box, medium->lower, medium->upper);
+    if (fog && method == BRUME_METHOD_DOM && renderer->frame.fog_upper.w == 0.0f) {
+        const vec4 low = renderer->frame.fog_lower, high = renderer->frame.fog_upper;
+        return (struct box){{low.x, low.y, low.z}, {high.x, high.y, high.z}};
+    }
     if (box_is_empty(&box))
         return fog ? scene_box(renderer, snapshot) : box;
     struct box all = box;
@@ -285,16 +303,16 @@ static int layout_field(struct renderer *renderer, const struct render_request *
 {
     struct gpu_frame *frame = &renderer->frame;
     const brume_settings *settings = &request->settings;
-    const struct box box = field_box(renderer, request->snapshot);
+    const struct box box = field_box(renderer, request->snapshot, settings->method);
     frame->field = (ivec4){0};
     memset(frame->fields, 0, sizeof frame->fields);
     if (!lattice_wants_field(settings) || box_is_empty(&box))
         return settings->field_resolution;
     int resolution = settings->field_resolution < 2 ? 2 : settings->field_resolution;
-    frame->field.x = settings->cascades;
+    frame->field.x = lattice_count(settings);
     for (;; resolution = resolution * 3 / 4) {
         frame->fields[0] = whole_field(&box, resolution);
-        for (int i = 1; i < settings->cascades; ++i) {
+        for (int i = 1; i < frame->field.x; ++i) {
             float focus[3];
             focus_of(renderer, request, ldexpf(longest(&box), -i), focus);
             frame->fields[i] = field_within(&frame->fields[i - 1], focus);
@@ -310,7 +328,7 @@ void lattice_place(struct renderer *renderer, const struct render_request *reque
     struct gpu_frame *frame = &renderer->frame;
     frame->fog_lower = frame->fog_upper = (vec4){0};
     frame->fog_sigma_s = frame->fog_sigma_t = frame->fog_emission = (vec4){0};
-    layout_fog(renderer, request->snapshot);
+    layout_fog(renderer, request->snapshot, request->settings.method);
     renderer->field_resolution = layout_field(renderer, request);
 }
 
@@ -364,7 +382,9 @@ brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,
     }
 
     const int fog = frame->fog_lower.w != 0.0f;
-    if (renderer->shadows.world_count && (medium->dims[0] || fog)) {
+    /* DOM carries the world's light through the field's lattice. */
+    if (renderer->shadows.world_count && (medium->dims[0] || fog) &&
+        settings->method != BRUME_METHOD_DOM) {
         struct box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
         if (medium->dims[0])
             box_join(&box, medium->lower, medium->upper);

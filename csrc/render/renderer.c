@@ -114,7 +114,8 @@ static brume_result work_medium(struct run *run)
                      "to keep the memory budget",
                      lattice.dims[0], lattice.dims[1], lattice.dims[2],
                      request->settings.medium_resolution);
-        result = medium_textures_upload(run->gpu, &run->renderer->medium, &lattice);
+        result = medium_textures_upload(run->gpu, &run->renderer->medium, &lattice,
+                                        request->settings.method == BRUME_METHOD_DOM);
         medium_finish(&lattice);
     }
     return result;
@@ -171,6 +172,7 @@ static void set_paths(struct run *run)
     run->renderer->frame.paths = (ivec4){
         .x = all || sum || paths == BRUME_PATHS_SINGLE,
         .y = all || sum || paths == BRUME_PATHS_REFLECTED_MARCHED,
+        .z = run->request->settings.method == BRUME_METHOD_DOM,
     };
 }
 
@@ -226,7 +228,7 @@ static brume_result work_transport(struct run *run)
         .tau_size = {renderer->tau_size[0], renderer->tau_size[1], renderer->tau_size[2]},
     };
     if (!renderer->frame.field.x) /* left by another method, or by other paths */
-        texture_finish(&run->gpu->memory, &renderer->transport.field);
+        transport_forget_field(run->gpu, &renderer->transport);
     return method->run(&renderer->transport, &input);
 }
 
@@ -321,8 +323,11 @@ static brume_result bind_view(struct run *run, int end)
     medium_textures_bind(&renderer->medium);
     shadows_bind(&renderer->shadows);
     transport_bind(&renderer->transport);
-    view_bind(request->targets);
-    return bind_frame(run);
+    TRY(bind_frame(run));
+    if (renderer->frame.paths.z != 0 && renderer->frame.field.x != 0)
+        TRY(dom_look(run->gpu, &renderer->transport, &renderer->frame));
+    view_bind(request->targets); /* last: images are the others' too */
+    return BRUME_OK;
 }
 
 static void count_sample(struct render_request *request)
@@ -374,7 +379,8 @@ static uint64_t product_bytes(const struct renderer *renderer)
     return medium->scatter.bytes + medium->extinct.bytes + medium->emission.bytes +
            medium->bricks.bytes + renderer->shadows.maps.bytes + transport->tau.bytes +
            transport->sky[0].bytes + transport->sky[1].bytes + transport->sky[2].bytes +
-           transport->field.bytes;
+           transport->field.bytes + transport->light.bytes + transport->scattered.bytes +
+           transport->level.bytes;
 }
 
 /* Shares out what pictures, meshes and images leave. What was made under a larger share goes
@@ -393,7 +399,9 @@ static brume_result share_budget(struct run *run)
                     "memory budget is %.1f MiB",
                     (double)taken / (1 << 20), (double)budget / (1 << 20));
     const uint64_t all = budget - taken;
-    const uint64_t field = request->settings.method == BRUME_METHOD_LPV ? all / 4 : 0;
+    const uint64_t field = request->settings.method == BRUME_METHOD_LPV   ? all / 4
+                           : request->settings.method == BRUME_METHOD_DOM ? all / 2
+                                                                          : 0;
     const uint64_t rest = all - field;
     renderer->shares = (struct shares){
         .medium = rest / 4, .shadow = rest / 8 * 3, .depth = rest / 4, .sky = rest / 8, .field = field};
@@ -490,8 +498,9 @@ static brume_result run_stages(struct run *run)
     const uint64_t medium[] = {snapshot->tables[BRUME_KIND_VOLUME].revision,
                                (uint64_t)settings->medium_resolution,
                                least(shares->medium / MEDIUM_CELL_BYTES,
-                                     cube(settings->medium_resolution))};
-    TRY(run_if_changed(run, BRUME_STAGE_MEDIUM, medium, 3, work_medium));
+                                     cube(settings->medium_resolution)),
+                               settings->method == BRUME_METHOD_DOM};
+    TRY(run_if_changed(run, BRUME_STAGE_MEDIUM, medium, 4, work_medium));
     TRY(shadows_plan(snapshot, settings, &renderer->geometry, shares->shadow,
                      &renderer->shadow_plan));
     const uint64_t shadow[] = {stages[BRUME_STAGE_UPLOAD].revision,
@@ -513,10 +522,11 @@ static brume_result run_stages(struct run *run)
                                   (uint64_t)settings->field_resolution,
                                   settings->light_paths == BRUME_PATHS_ALL,
                                   settings->blockers,
+                                  (uint64_t)settings->ordinates,
                                   float_bits(snapshot->world.reach),
                                   hash_bytes(HASH_START, renderer->frame.fields,
                                              sizeof renderer->frame.fields)};
-    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 13, work_transport));
+    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 14, work_transport));
     collect_warnings(run);
     return BRUME_OK;
 }

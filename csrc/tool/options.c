@@ -392,7 +392,8 @@ static bool parse_depths(const char *option, const char *text, options *out)
 
 static bool parse_method(const char *option, const char *text, options *out)
 {
-    static const char *const methods[] = {[BRUME_METHOD_OPV] = "opv", [BRUME_METHOD_LPV] = "lpv"};
+    static const char *const methods[] = {[BRUME_METHOD_OPV] = "opv", [BRUME_METHOD_LPV] = "lpv",
+                                          [BRUME_METHOD_DOM] = "dom"};
     for (uint32_t method = 0; method < BRUME_METHOD_COUNT; ++method)
         if (strcmp(text, methods[method]) == 0) {
             out->settings.method = method;
@@ -490,6 +491,7 @@ static const struct spec specs[] = {
     {"method", KIND_OWN, .parse = parse_method},
     {"field-resolution", KIND_COUNT, AT(settings.field_resolution), .upper = 256},
     {"cascades", KIND_COUNT, AT(settings.cascades), .upper = 3},
+    {"ordinates", KIND_COUNT, AT(settings.ordinates), .upper = 96},
     {"iterations", KIND_COUNT, AT(settings.iterations), .upper = 100000},
     {"depths", KIND_OWN, .parse = parse_depths},
     {"blockers", KIND_OWN, .parse = parse_blockers},

@@ -15,7 +15,8 @@
 
 bool lpv_is_fuzzy(const struct lpv_work *work)
 {
-    return work->input->settings->blockers == BRUME_BLOCKERS_FUZZY;
+    const brume_settings *settings = work->input->settings;
+    return settings->method == BRUME_METHOD_LPV && settings->blockers == BRUME_BLOCKERS_FUZZY;
 }
 
 static void clear(const struct texture textures[2])

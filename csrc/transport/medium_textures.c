@@ -4,6 +4,7 @@
 #include "base/result.h"
 #include "brume_gpu.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -106,9 +107,28 @@ static brume_result fill(struct gpu *gpu, struct texture *texture, GLenum format
     return BRUME_OK;
 }
 
-brume_result medium_textures_upload(struct gpu *gpu, struct medium_textures *textures,
-                                    struct medium_lattice *lattice)
+float medium_forward_share(float g)
 {
+    return g * g * g * g;
+}
+
+static void scale(struct medium_lattice *lattice)
+{
+    const size_t cells =
+        (size_t)lattice->dims[0] * (size_t)lattice->dims[1] * (size_t)lattice->dims[2];
+    for (size_t cell = 0; cell < cells; ++cell) {
+        const float *scatter = lattice->scatter + 4 * cell;
+        float *extinct = lattice->extinct + 4 * cell;
+        for (int c = 0; c < 3; ++c)
+            extinct[c] = fmaxf(extinct[c] - medium_forward_share(scatter[3]) * scatter[c], 0.0f);
+    }
+}
+
+brume_result medium_textures_upload(struct gpu *gpu, struct medium_textures *textures,
+                                    struct medium_lattice *lattice, bool scaled)
+{
+    if (scaled)
+        scale(lattice);
     fit_halves(lattice);
     memcpy(textures->dims, lattice->dims, sizeof textures->dims);
     memcpy(textures->lower, lattice->lower, sizeof textures->lower);

@@ -8,6 +8,7 @@
 static const struct method methods[BRUME_METHOD_COUNT] = {
     [BRUME_METHOD_OPV] = {"OPV", opv_run},
     [BRUME_METHOD_LPV] = {"LPV", lpv_run},
+    [BRUME_METHOD_DOM] = {"DOM", dom_run},
 };
 
 const struct method *method_find(uint32_t number)
@@ -22,6 +23,15 @@ void transport_bind(const struct transport *transport)
     glBindTextureUnit(SLOT_SKY_G, transport->sky[1].id);
     glBindTextureUnit(SLOT_SKY_B, transport->sky[2].id);
     glBindTextureUnit(SLOT_FIELD, transport->field.id);
+    glBindTextureUnit(SLOT_SCATTERED, transport->scattered.id);
+}
+
+void transport_forget_field(struct gpu *gpu, struct transport *transport)
+{
+    texture_finish(&gpu->memory, &transport->field);
+    texture_finish(&gpu->memory, &transport->light);
+    texture_finish(&gpu->memory, &transport->scattered);
+    buffer_finish(&gpu->memory, &transport->level);
 }
 
 void transport_finish(struct gpu *gpu, struct transport *transport)
@@ -29,7 +39,7 @@ void transport_finish(struct gpu *gpu, struct transport *transport)
     texture_finish(&gpu->memory, &transport->tau);
     for (int i = 0; i < 3; ++i)
         texture_finish(&gpu->memory, &transport->sky[i]);
-    texture_finish(&gpu->memory, &transport->field);
+    transport_forget_field(gpu, transport);
     free(transport->tau_signatures);
     memset(transport, 0, sizeof *transport);
 }

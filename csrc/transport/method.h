@@ -16,6 +16,9 @@ struct transport {
     struct texture tau;    /* optical depth to each light over the length of the way, a tile a light */
     struct texture sky[3]; /* the world's light, spherical harmonics a colour */
     struct texture field;  /* light scattered or reflected before, as lpv_finish leaves it */
+    struct texture light, scattered; /* DOM: its moments, and what cells scatter of it to the eye */
+    struct buffer level;   /* and the lattice that they are of */
+    uint64_t eye;          /* of the eye that it was last found for, 0: none */
     /* Signatures of what a light's tile and the sky hold, 0: nothing of use. */
     uint64_t *tau_signatures, sky_signature;
     uint32_t tau_count;
@@ -46,10 +49,16 @@ struct method {
 /* NULL for an unknown number. */
 const struct method *method_find(uint32_t number);
 void transport_bind(const struct transport *transport);
+/* What is known of light scattered or reflected. */
+void transport_forget_field(struct gpu *gpu, struct transport *transport);
 void transport_finish(struct gpu *gpu, struct transport *transport);
 
 /* The methods. */
 brume_result opv_run(struct transport *transport, const struct transport_input *input);
 brume_result lpv_run(struct transport *transport, const struct transport_input *input);
+brume_result dom_run(struct transport *transport, const struct transport_input *input);
+
+/* DOM: makes transport->scattered for the eye of the frame, which is bound, unless it is for that one. */
+brume_result dom_look(struct gpu *gpu, struct transport *transport, const struct gpu_frame *frame);
 
 #endif

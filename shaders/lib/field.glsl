@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The light that was scattered or reflected, as the view takes it from its lattice.
-#include "lib/links.glsl"
+#include "lib/cuts.glsl"
 
 layout(binding = SLOT_FIELD) uniform sampler3D field_lattice; // as lpv_finish leaves it
+layout(binding = SLOT_SCATTERED) uniform sampler3D scattered_lattice; // DOM's
 
 struct field_light
 {
@@ -13,17 +14,6 @@ struct field_light
 bool field_exists()
 {
     return frame.field.x != 0;
-}
-
-// Numbers of links by their offsets, x first; 31: there is none to the cell itself.
-const uint NUMBERS[27] = uint[](
-    22u, 20u, 12u, 18u, 15u, 6u, 24u, 8u, 10u, 16u, 14u, 4u, 13u, 31u,
-    0u, 17u, 1u, 3u, 23u, 21u, 11u, 19u, 2u, 5u, 25u, 7u, 9u);
-
-// Whether a surface cuts the link from a cell with those cut links, by the offset to its neighbour.
-bool is_cut(uint cuts, ivec3 offset)
-{
-    return (cuts >> NUMBERS[9 * offset.z + 3 * offset.y + offset.x + 13] & 1u) != 0u;
 }
 
 // Where a cell's colours are in the texture: 0 to 2, or what parts it from others: 3.
@@ -62,31 +52,55 @@ void add_cell(inout field_light light, gpu_field field, ivec3 cell, float weight
     }
 }
 
-// Interpolated between the eight cells around a point, but for those that a surface parts from the
-// cell that it belongs to, and those not before the plane (xyz: normal, w: its points' product with
-// that).
-field_light field_between(gpu_field field, vec3 p, vec4 plane)
+// The eight cells around a point.
+struct cells_between
+{
+    ivec3 low, last; // the one before it on all axes; the lattice's last
+    vec3 f;          // how far the point is from there to the next
+    ivec3 home;      // the one that it belongs to, and the links of that that are cut
+    uint cuts;
+};
+
+cells_between cells_around(gpu_field field, vec3 p)
 {
     vec3 at = (p - field.lower.xyz) / field.lower.w - 0.5;
-    ivec3 last = field.dims.xyz - 1;
-    ivec3 low = ivec3(floor(at));
-    vec3 f = at - vec3(low);
-    ivec3 home = home_of(field, low, f, last);
-    vec2 sides = texelFetch(field_lattice, texel_of(field, home, 3), 0).xy;
-    uint cuts = uint(sides.x) | uint(sides.y) << 13;
+    cells_between cells;
+    cells.last = field.dims.xyz - 1;
+    cells.low = ivec3(floor(at));
+    cells.f = at - vec3(cells.low);
+    cells.home = home_of(field, cells.low, cells.f, cells.last);
+    vec2 sides = texelFetch(field_lattice, texel_of(field, cells.home, 3), 0).xy;
+    cells.cuts = uint(sides.x) | uint(sides.y) << 13;
+    return cells;
+}
+
+// How much one of them, by its corner, counts at the point: nothing where a surface parts it from the
+// cell that the point belongs to, or it is not before the plane (xyz: normal, w: its points' product
+// with that).
+float share_of_cell(cells_between cells, gpu_field field, int corner, vec4 plane, out ivec3 cell)
+{
+    ivec3 side = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
+    cell = clamp(cells.low + side, ivec3(0), cells.last);
+    vec3 each = mix(1.0 - cells.f, cells.f, vec3(side));
     // A cell that more links to are cut than to one where three walls meet is within something small,
     // and tells nothing.
-    bool within = bitCount(cuts) > 19;
+    bool within = bitCount(cells.cuts) > 19;
+    bool parted = within ? cell == cells.home : is_cut(cells.cuts, cell - cells.home);
+    return parted || dot(cell_centre(field, cell), plane.xyz) < plane.w ? 0.0
+                                                                        : each.x * each.y * each.z;
+}
+
+// Interpolated between the eight cells around a point.
+field_light field_between(gpu_field field, vec3 p, vec4 plane)
+{
+    cells_between cells = cells_around(field, p);
     field_light light = field_light(vec3(0.0), mat3(0.0));
     float sum = 0.0;
     int corners = 8 * min(frame.field.x, 1); // not unrolled, which would take seconds to compile
     for (int corner = 0; corner < corners; ++corner) {
-        ivec3 side = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
-        ivec3 cell = clamp(low + side, ivec3(0), last);
-        vec3 each = mix(1.0 - f, f, vec3(side));
-        float weight = each.x * each.y * each.z;
-        if (weight <= 0.0 || (within ? cell == home : is_cut(cuts, cell - home)) ||
-            dot(cell_centre(field, cell), plane.xyz) < plane.w)
+        ivec3 cell;
+        float weight = share_of_cell(cells, field, corner, plane, cell);
+        if (weight <= 0.0)
             continue;
         sum += weight;
         add_cell(light, field, cell, weight);
@@ -97,7 +111,7 @@ field_light field_between(gpu_field field, vec3 p, vec4 plane)
         return light;
     }
     light = field_light(vec3(0.0), mat3(0.0));
-    add_cell(light, field, home, 1.0);
+    add_cell(light, field, cells.home, 1.0);
     return light;
 }
 
@@ -148,6 +162,28 @@ vec3 field_scatter(vec3 p, vec3 out_direction, float g)
         return vec3(0.0);
     field_light light = field_at(p, vec3(0.0), frame.field.x - 1);
     return max(light.fluence + 3.0 * g * (out_direction * light.flux), vec3(0.0)) / (4.0 * PI);
+}
+
+// The same as DOM's cells scatter it, per unit of sigma_s. Where no surface is near the texture's own
+// interpolation does.
+vec3 field_scattered(vec3 p)
+{
+    if (!field_reaches(p))
+        return vec3(0.0);
+    gpu_field field = frame.fields[0];
+    vec3 at = clamp((p - field.lower.xyz) / field.lower.w, vec3(0.5), vec3(field.dims.xyz) - 0.5);
+    vec4 light = textureLod(scattered_lattice, at / vec3(textureSize(scattered_lattice, 0)), 0.0);
+    vec4 sum = vec4(0.0);
+    // A loop rather than a branch: software runs through both sides of every branch.
+    for (int near = light.w > 0.0 ? 1 : 0; near > 0; --near) {
+        cells_between cells = cells_around(field, p);
+        for (int corner = 0; corner < 8; ++corner) {
+            ivec3 cell;
+            float weight = share_of_cell(cells, field, corner, vec4(0.0, 0.0, 0.0, -1.0), cell);
+            sum += weight * vec4(texelFetch(scattered_lattice, cell, 0).rgb, 1.0);
+        }
+    }
+    return sum.w > 1e-3 ? sum.rgb / sum.w : light.rgb;
 }
 
 vec3 field_irradiance(field_light light, vec3 normal)

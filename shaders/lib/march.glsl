@@ -132,6 +132,10 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
     bool sun = light.info.x == uint(LIGHT_SUN);
     float along;
     float h = nearest_approach(light, light_sample, ray, along);
+    // Where a strong forward peak counts as not scattered, the light in the peak itself is seen as far as
+    // it is scattered no more, be it forwards: light in the peak that was scattered twice and more is
+    // what the lesser depth towards the lamp adds.
+    vec3 sharp = transmittance;
     vec3 sum = vec3(0.0);
     for (int k = first; k < end; ++k) {
         float within = step_jitter(jitter, k);
@@ -154,11 +158,21 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
         if (light_here != vec3(0.0)) {
             if (!sun)
                 light_here *= mean_inverse_square(t0 - along, t0 + dt - along, h);
-            sum += transmittance * step_weight(m.sigma_t, through, dt) * m.sigma_s * light_here *
-                   (phase_hg(dot(towards, ray.direction), m.g) *
-                    light_transmittance(light, p, towards, distance));
+            vec3 here = m.sigma_s * light_here * light_transmittance(light, p, towards, distance);
+            float cosine = dot(towards, ray.direction), phase = phase_hg(cosine, m.g);
+            if (frame.paths.z == 0) {
+                sum += transmittance * step_weight(m.sigma_t, through, dt) * here * phase;
+            } else {
+                float soft = phase_truncated(cosine, m.g);
+                vec3 sigma_t = m.sigma_t + m.g * m.g * m.g * m.g * m.sigma_s;
+                vec3 sharp_through = exp(-sigma_t * dt);
+                sum += here * (transmittance * step_weight(m.sigma_t, through, dt) * soft +
+                               sharp * step_weight(sigma_t, sharp_through, dt) * (phase - soft));
+            }
         }
         transmittance *= through;
+        if (frame.paths.z != 0)
+            sharp *= exp(-(m.sigma_t + m.g * m.g * m.g * m.g * m.sigma_s) * dt);
     }
     return sum * light.factors.z;
 }
@@ -200,7 +214,9 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
         }
         if (field_exists() && frame.paths.y != 0) {
             if (t >= field_next) {
-                field = field_scatter(ray.origin + ray.direction * t, -ray.direction, m.g);
+                vec3 p = ray.origin + ray.direction * t;
+                field = frame.paths.z != 0 ? field_scattered(p)
+                                           : field_scatter(p, -ray.direction, m.g);
                 field_next = t + field_every;
             }
             state.indirect += weight * m.sigma_s * field;

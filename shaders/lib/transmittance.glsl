@@ -15,8 +15,8 @@ vec3 mean_extinction(gpu_light light, vec3 p)
     return textureLod(depth_lattice, (node + 0.5) / vec3(textureSize(depth_lattice, 0)), 0.0).rgb;
 }
 
-// towards: unit vector from p to the light, distance: how far it is.
-vec3 light_transmittance(gpu_light light, vec3 p, vec3 towards, float distance)
+// Optical depth. towards: unit vector from p to the light, distance: how far it is.
+vec3 light_depth(gpu_light light, vec3 p, vec3 towards, float distance)
 {
     vec3 tau = fog_tau(p, towards, distance);
     if (light.info.w != 0u) {
@@ -26,5 +26,10 @@ vec3 light_transmittance(gpu_light light, vec3 p, vec3 towards, float distance)
         if (from < to)
             tau += mean_extinction(light, p + towards * from) * (to - from);
     }
-    return exp(-tau);
+    return tau;
+}
+
+vec3 light_transmittance(gpu_light light, vec3 p, vec3 towards, float distance)
+{
+    return exp(-light_depth(light, p, towards, distance));
 }

@@ -30,6 +30,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_FRAME 0
 #define SLOT_STAGE 1
 #define SLOT_LEVEL 2
+#define SLOT_ORDINATES 3     /* and as a storage buffer where they are written */
 
 /* Storage buffers */
 #define SLOT_LIGHTS 0
@@ -42,6 +43,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_REST 6
 #define SLOT_DEPTH_GROUPS 7
 #define SLOT_POWERS 8
+#define SLOT_DOTS 9
 
 /* Textures */
 #define SLOT_MEDIUM_SCATTER 0
@@ -76,6 +78,15 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_BLOCKED 30
 #define SLOT_HALF 31
 #define SLOT_AROUND 32       /* which cell of the lattice around a cell beyond this one is in */
+#define SLOT_SCATTERED 33    /* what cells scatter towards the eye */
+/* DOM's, while it looks for the field */
+#define SLOT_ANGULAR 24      /* by ordinates: the source; in the end what cells' means are, */
+#define SLOT_HITS 25         /* and what meets surfaces */
+#define SLOT_SLICE 26        /* radiance that leaves the slice of cells before */
+#define SLOT_CUTS 30
+#define SLOT_MOMENTS 34      /* and one more that a stage's shader names */
+#define SLOT_CELL_WALLS 31   /* radiance of the surfaces in a cell */
+#define SLOT_HISTORY 24      /* and three more: residuals, or results */
 
 /* Images written by compute passes, and by the drawing of links */
 #define SLOT_OUTPUT 0
@@ -117,6 +128,14 @@ typedef struct mat4 { float m[16]; } mat4;
 
 /* Lattices of light scattered or reflected, one within another, at most. */
 #define FIELD_LEVELS 3
+
+/* DOM: ordinates, the directions that light is carried along, at most; moments of the radiance, real
+ * spherical harmonics of bands 0 to 3, four by four in a texture; of these the first bands, 0 and 1, are
+ * extrapolated from so many iterations. */
+#define MOST_ORDINATES 96
+#define MOMENT_SIDE 4
+#define MOMENTS 16
+#define HISTORY 4
 
 /* Lights, numbered as brume_light_type of brume.h; the world is one more. */
 #define LIGHT_SUN 0
@@ -238,6 +257,24 @@ struct gpu_field {
 typedef struct gpu_field gpu_field;
 #endif
 
+/* A direction that DOM carries light along. */
+struct gpu_ordinate {
+    vec4 direction;      /* w: weight, sr */
+    vec4 world;          /* mean radiance of the world around where light comes from along it */
+    vec4 harmonics[4];   /* of the direction */
+    uvec4 links_in;      /* bits of the four links by which light along it comes into a cell, */
+    uvec4 links_out;     /* and goes on; as lib/cuts.glsl numbers them */
+};
+#ifndef GL_core_profile
+typedef struct gpu_ordinate gpu_ordinate;
+#endif
+
+/* The block of DOM's stages. */
+struct gpu_ordinates {
+    ivec4 count;         /* x: ordinates; y: of their tiles, how many stand along z; the next along y */
+    gpu_ordinate list[MOST_ORDINATES];
+};
+
 struct gpu_frame {
     vec4 ray_origin, ray_origin_x, ray_origin_y; /* ray = origin + x ndc.x + y ndc.y */
     vec4 ray_direction, ray_direction_x, ray_direction_y; /* view depth 1 per unit */
@@ -264,7 +301,9 @@ struct gpu_frame {
                             samples, in an order of steps of w among them */
     vec4 march;          /* step, m; steps in fog alone; rows of this dispatch: first, end */
     ivec4 paths;         /* 0 leaves out: x: what media scatter of the lights' own light; y: of the
-                            field */
+                            field; z: 1: strong forward scattering counts as none in all optical
+                            depths (delta-M), and media take the field from the lattice of what
+                            cells scatter towards the eye */
     ivec4 pass_slots[2]; /* slot of each pass in the accumulation buffer, -1: not wanted */
 };
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pictures that are compared with Cycles: a scene, the lamps that are lit, and a tolerance.
 
-All but those of LPV are direct light and single scattering only. Cycles' samples are chosen so that
-its own noise stays below a quarter of the tolerance; the tests assert that too.
+All but those of LPV and DOM are direct light and single scattering only. Cycles' samples are chosen
+so that its own noise stays below a quarter of the tolerance; the tests assert that too.
 """
 import os
 from dataclasses import dataclass
@@ -34,9 +34,17 @@ class Case:
 
     @property
     def name(self):
+        return '-'.join(self._parts(self.method))
+
+    @property
+    def reference(self):
+        """The name of what Cycles rendered, which serves all methods that go on alike."""
+        return '-'.join(self._parts('all_bounces'))
+
+    def _parts(self, beyond):
         lamp = self.lamps if len(self.lamps) == 1 else ()
-        method = [self.method] if self.method != 'OPV' else []
-        return '-'.join((self.scene, *lamp, *([self.change] if self.change else []), *method))
+        return (self.scene, *lamp, *([self.change] if self.change else []),
+                *([beyond] if self.method != 'OPV' else []))
 
     def apply(self, scene):
         if self.change:
@@ -90,4 +98,8 @@ CASES = {case.name: case for case in (
     Case('cloud', (), 0.07, 512, zoom=1.15, method='LPV'),
     Case('room', (), 0.10, 2048, method='LPV'),
     Case('room_smoke', (), 0.10, 1024, method='LPV'),
+    Case('cube', (), 0.04, 512, zoom=1.4, method='DOM'),
+    Case('cloud', (), 0.04, 512, zoom=1.15, method='DOM'),
+    Case('room', (), 0.10, 2048, method='DOM'),
+    Case('room_smoke', (), 0.10, 1024, method='DOM'),
 )}

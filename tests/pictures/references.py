@@ -58,7 +58,7 @@ def digest(case):
 
 
 def path_of(case):
-    return os.path.join(REFERENCES, case.name + '.npz')
+    return os.path.join(REFERENCES, case.reference + '.npz')
 
 
 def refresh(case):

@@ -1,0 +1,470 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* DOM: multiple scattering by discrete ordinates, which converges to the truth;
+ * docs/methods/dom.md. Optical depths towards the lamps are OPV's, surfaces' cuts and reflections
+ * LPV's. */
+#include "transport/dom.h"
+#include "base/hash.h"
+#include "base/result.h"
+#include "gl/timer.h"
+#include "transport/method.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MOST_ITERATIONS 100
+/* Of the radiance's bands 0 and 1, root of the mean square: what an iteration may change in the
+ * end. */
+#define CONVERGED 5e-4
+
+struct dom_work {
+    struct lpv_work cells; /* the lattice: what it is filled with, and its surfaces */
+    int count, axes[3];    /* ordinates: all, and by their major axes */
+    int across;            /* tiles of theirs along z */
+    struct buffer ordinates, dots;
+    struct texture sources, means, hits; /* by ordinates */
+    struct texture slices[2];            /* what leaves a slice of cells */
+    struct texture cuts, wall;           /* all links that surfaces cut; these surfaces' radiance */
+    struct texture first, world, now, next; /* moments: of the first source, of the world's own
+                                               light, of what an iteration begins with, and finds */
+    struct texture residuals[HISTORY], results[HISTORY]; /* of bands 0 and 1 */
+    int slots[HISTORY], kept;                            /* which of these, from the oldest on */
+    double products[3][HISTORY][HISTORY];                /* of residuals, by slots, colours apart */
+};
+
+static brume_result lattice_texture(struct dom_work *work, struct texture *texture, GLenum format,
+                                    int across, int up, int deep, const char *label)
+{
+    const ivec4 dims = work->cells.field->dims;
+    return texture_init(&work->cells.input->gpu->memory, texture, FOR_TRANSPORT, GL_TEXTURE_3D,
+                        format, texture_side(across * dims.x), texture_side(up * dims.y),
+                        texture_side(deep * dims.z), 1, label);
+}
+
+static brume_result make_cells(struct dom_work *work)
+{
+    struct lpv_work *cells = &work->cells;
+    struct memory *memory = &cells->input->gpu->memory;
+    const ivec4 dims = cells->field->dims;
+    static const char *const labels[] = {"cells' extinction", "cells' albedo", "cells' surfaces"};
+    TRY(buffer_init(memory, &cells->level, FOR_TRANSPORT, sizeof *cells->field, cells->field,
+                    "lattice"));
+    cells->tiles = (int)ceil(sqrt((double)dims.z));
+    for (int c = 0; c < 3; ++c) {
+        TRY(lattice_texture(work, &cells->cells[c], GL_RGBA16F, 1, 1, 1, labels[c]));
+        TRY(texture_init(memory, &cells->reflected[c], FOR_TRANSPORT, GL_TEXTURE_2D, GL_RGBA32F,
+                         texture_side(cells->tiles * dims.x),
+                         texture_side(lpv_tile_rows(&dims, cells->tiles) * dims.y), 1, 1,
+                         "reflected light"));
+    }
+    TRY(texture_init(memory, &cells->links, FOR_TRANSPORT, GL_TEXTURE_3D, GL_R32UI,
+                     texture_side(dims.x + 2), texture_side(dims.y + 2), texture_side(dims.z + 2),
+                     1, "cut links"));
+    TRY(lattice_texture(work, &work->cuts, GL_R32UI, 1, 1, 1, "cells' cut links"));
+    TRY(lattice_texture(work, &work->wall, GL_RGBA16F, 1, 1, 1, "surfaces' radiance"));
+    return lattice_texture(work, &cells->walls, GL_R32UI, WALL_TEXELS, 1, 1,
+                           "surfaces' reflectances");
+}
+
+/* Tiles of ordinates fill a column along z, then the next along y. */
+static brume_result make_ordinates(struct dom_work *work)
+{
+    struct gpu *gpu = work->cells.input->gpu;
+    const ivec4 dims = work->cells.field->dims;
+    const int limit = gpu->context.info.max_texture_3d;
+    const int most = (limit - 1) / dims.z;
+    work->across = work->count < most ? work->count : most;
+    const int columns = (work->count + work->across - 1) / work->across;
+    if (columns * dims.y >= limit)
+        return fail(BRUME_E_UNSUPPORTED,
+                    "%d directions of a lattice of %d x %d x %d cells are more than "
+                    "this machine's textures hold",
+                    work->count, dims.x, dims.y, dims.z);
+    struct gpu_ordinates *block = calloc(1, sizeof *block);
+    if (!block)
+        return fail(BRUME_E_MEMORY, "no memory for ordinates");
+    vec4 directions[MOST_ORDINATES];
+    dom_quadrature(work->count, directions, work->axes);
+    block->count = (ivec4){work->count, work->across, 0, 0};
+    for (int i = 0; i < work->count; ++i)
+        block->list[i].direction = directions[i];
+    const brume_result result = buffer_init(&gpu->memory, &work->ordinates, FOR_TRANSPORT,
+                                            sizeof *block, block, "ordinates");
+    free(block);
+    TRY(result);
+    TRY(lattice_texture(work, &work->sources, GL_RGBA16F, 1, columns, work->across, "sources"));
+    TRY(lattice_texture(work, &work->means, GL_RGBA16F, 1, columns, work->across, "radiance"));
+    TRY(lattice_texture(work, &work->hits, GL_RGBA16F, 1, columns, work->across,
+                        "light on surfaces"));
+    int side = dims.x > dims.y ? dims.x : dims.y;
+    side = side > dims.z ? side : dims.z;
+    for (int i = 0; i < 2; ++i)
+        TRY(texture_init(&gpu->memory, &work->slices[i], FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
+                         texture_side(side), texture_side(side), texture_side(work->count), 1,
+                         "light between slices"));
+    return BRUME_OK;
+}
+
+static brume_result make_moments(struct dom_work *work)
+{
+    struct texture *all[] = {&work->first, &work->world, &work->now, &work->next};
+    for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
+        TRY(lattice_texture(work, all[i], GL_RGBA16F, MOMENT_SIDE, MOMENT_SIDE, 1, "moments"));
+    for (int i = 0; i < HISTORY; ++i) {
+        TRY(lattice_texture(work, &work->residuals[i], GL_RGBA16F, MOMENT_SIDE, 1, 1, "residuals"));
+        TRY(lattice_texture(work, &work->results[i], GL_RGBA16F, MOMENT_SIDE, 1, 1, "results"));
+    }
+    const ivec4 dims = work->cells.field->dims;
+    return buffer_init(&work->cells.input->gpu->memory, &work->dots, FOR_TRANSPORT,
+                       (size_t)dims.y * (size_t)dims.z * (HISTORY + 1) * sizeof(vec4), NULL,
+                       "products");
+}
+
+static void finish(struct dom_work *work)
+{
+    struct memory *memory = &work->cells.input->gpu->memory;
+    struct lpv_work *cells = &work->cells;
+    struct texture *all[] = {&work->sources,   &work->means, &work->hits, &work->slices[0],
+                             &work->slices[1], &work->cuts,  &work->wall, &work->first,
+                             &work->world,     &work->now,   &work->next, &cells->links,
+                             &cells->walls};
+    for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
+        texture_finish(memory, all[i]);
+    for (int i = 0; i < HISTORY; ++i) {
+        texture_finish(memory, &work->residuals[i]);
+        texture_finish(memory, &work->results[i]);
+    }
+    for (int c = 0; c < 3; ++c) {
+        texture_finish(memory, &cells->cells[c]);
+        texture_finish(memory, &cells->reflected[c]);
+    }
+    buffer_finish(memory, &work->ordinates);
+    buffer_finish(memory, &work->dots);
+    buffer_finish(memory, &cells->level);
+    buffer_finish(memory, &cells->passes.block);
+}
+
+/* --- Passes over the lattice ---------------------------------------------------------------- */
+
+static void image(int slot, const struct texture *texture)
+{
+    glBindImageTexture((GLuint)slot, texture->id, 0, GL_TRUE, 0, GL_WRITE_ONLY, texture->format);
+}
+
+static void bind_lattice(const struct dom_work *work)
+{
+    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL, work->cells.level.id);
+    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_ORDINATES, work->ordinates.id);
+    glBindTextureUnit(SLOT_CELL_EXTINCT, work->cells.cells[0].id);
+    glBindTextureUnit(SLOT_CELL_ALBEDO, work->cells.cells[1].id);
+    glBindTextureUnit(SLOT_CUTS, work->cuts.id);
+}
+
+static brume_result over_field(struct dom_work *work, const char *stem, ivec4 offset)
+{
+    TRY(lpv_over_lattice(&work->cells, stem, offset, &work->cells.field->dims));
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+    return BRUME_OK;
+}
+
+/* Without lamps and surfaces, what the world sends into the lattice. */
+static bool has_world(const struct dom_work *work)
+{
+    return work->cells.input->world_count > 0;
+}
+
+static brume_result prepare(struct dom_work *work)
+{
+    struct lpv_work *cells = &work->cells;
+    const struct program *program;
+    static const float nothing[4];
+    TRY(make_cells(work));
+    TRY(make_ordinates(work));
+    TRY(make_moments(work));
+    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL, cells->level.id);
+    laps_go(cells->laps, BRUME_FIELD_SURFACES);
+    TRY(lpv_cut_links(cells));
+    laps_go(cells->laps, BRUME_FIELD_MEDIUM);
+    glBindTextureUnit(SLOT_WALLS, cells->walls.id);
+    glBindTextureUnit(SLOT_LINKS, cells->links.id);
+    for (int c = 0; c < 3; ++c)
+        image(SLOT_OUTPUT + c, &cells->cells[c]);
+    image(SLOT_OUTPUT_FIELD, &work->cuts);
+    TRY(over_field(work, "dom_cells", (ivec4){0}));
+    TRY(lpv_reflect(cells));
+    laps_go(cells->laps, BRUME_FIELD_PREPARE);
+    TRY(program_compute(&cells->input->gpu->programs, "dom_ordinates", &program));
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ORDINATES, work->ordinates.id);
+    program_dispatch(program, GROUP_REST * work->count, 1, 1);
+    glMemoryBarrier(GL_UNIFORM_BARRIER_BIT);
+    glClearTexImage(work->wall.id, 0, GL_RGBA, GL_FLOAT, nothing);
+    glClearTexImage(work->now.id, 0, GL_RGBA, GL_FLOAT, nothing);
+    glClearTexImage(work->hits.id, 0, GL_RGBA, GL_FLOAT, nothing);
+    return BRUME_OK;
+}
+
+/* --- Iterations ----------------------------------------------------------------------------- */
+
+/* Light along all ordinates through the whole lattice, slice by slice, into work->means. */
+static brume_result sweep(struct dom_work *work, bool world)
+{
+    const struct program *program;
+    const int dims[3] = {work->cells.field->dims.x, work->cells.field->dims.y,
+                         work->cells.field->dims.z};
+    TRY(program_compute(&work->cells.input->gpu->programs, "dom_sweep", &program));
+    bind_lattice(work);
+    glBindTextureUnit(SLOT_CELL_WALLS, work->wall.id);
+    glBindTextureUnit(SLOT_ANGULAR, work->sources.id);
+    image(SLOT_OUTPUT, &work->means);
+    image(SLOT_OUTPUT + 2, &work->hits);
+    const int most = dims[0] > dims[1] ? (dims[0] > dims[2] ? dims[0] : dims[2])
+                                       : (dims[1] > dims[2] ? dims[1] : dims[2]);
+    for (int slice = 0; slice < most; ++slice) {
+        TRY(opv_go_on(&work->cells.passes, 0.0f));
+        glBindTextureUnit(SLOT_SLICE, work->slices[slice % 2].id);
+        image(SLOT_OUTPUT + 1, &work->slices[1 - slice % 2]);
+        for (int axis = 0, begin = 0; axis < 3; begin += work->axes[axis++]) {
+            if (slice >= dims[axis])
+                continue;
+            glProgramUniform4i(program->id, 0, slice, begin, axis, world);
+            program_dispatch(program, dims[(axis + 1) % 3], dims[(axis + 2) % 3], work->axes[axis]);
+        }
+        glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    }
+    return BRUME_OK;
+}
+
+/* The moments of work->means, into `moments`; of light from sources also the history's newest, and
+ * the radiance of surfaces. */
+static brume_result gather(struct dom_work *work, const struct texture *moments, bool sources)
+{
+    bind_lattice(work);
+    const int newest = work->slots[work->kept - 1];
+    glBindTextureUnit(SLOT_WALLS, work->cells.cells[2].id);
+    glBindTextureUnit(SLOT_ANGULAR, work->means.id);
+    glBindTextureUnit(SLOT_HITS, work->hits.id);
+    glBindTextureUnit(SLOT_MOMENTS, work->now.id);
+    image(SLOT_OUTPUT, moments);
+    image(SLOT_OUTPUT + 1, &work->wall);
+    image(SLOT_OUTPUT + 2, &work->residuals[newest]);
+    image(SLOT_OUTPUT + 3, &work->results[newest]);
+    /* Reflected light is bound where moments are. */
+    for (int c = 0; c < 3; ++c)
+        glBindTextureUnit((GLuint)(SLOT_REFLECTED + c), work->cells.reflected[c].id);
+    return over_field(work, "dom_gather", (ivec4){sources, work->cells.tiles, 0, 0});
+}
+
+/* Makes room for one more in the history. */
+static void begin_entry(struct dom_work *work)
+{
+    if (work->kept < HISTORY) {
+        work->slots[work->kept] = work->kept;
+        ++work->kept;
+        return;
+    }
+    const int oldest = work->slots[0];
+    memmove(work->slots, work->slots + 1, (HISTORY - 1) * sizeof *work->slots);
+    work->slots[HISTORY - 1] = oldest;
+}
+
+/* The newest residual's products with all that are kept. Into *change its length over the result's.
+ */
+static brume_result compare(struct dom_work *work, double *change)
+{
+    const struct program *program;
+    const ivec4 dims = work->cells.field->dims;
+    const int newest = work->slots[work->kept - 1];
+    TRY(program_compute(&work->cells.input->gpu->programs, "dom_dots", &program));
+    bind_lattice(work);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_DOTS, work->dots.id);
+    for (int i = 0; i < HISTORY; ++i)
+        glBindTextureUnit((GLuint)(SLOT_HISTORY + i), work->residuals[i].id);
+    glBindTextureUnit(SLOT_MOMENTS, work->results[newest].id);
+    TRY(opv_set_pass(&work->cells.passes,
+                     (struct gpu_lattice_pass){.offset = {newest, work->kept, 0, 0}}));
+    program_dispatch(program, dims.y, dims.z, 1);
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+
+    const size_t rows = (size_t)dims.y * (size_t)dims.z, count = rows * (HISTORY + 1);
+    vec4 *parts = malloc(count * sizeof *parts);
+    if (!parts)
+        return fail(BRUME_E_MEMORY, "no memory for %zu products", count);
+    glGetNamedBufferSubData(work->dots.id, 0, (GLsizeiptr)(count * sizeof *parts), parts);
+    double sums[HISTORY + 1][3] = {{0}};
+    for (size_t row = 0; row < rows; ++row)
+        for (int i = 0; i <= HISTORY; ++i)
+            for (int c = 0; c < 3; ++c)
+                sums[i][c] += (double)(&parts[row * (HISTORY + 1) + (size_t)i].x)[c];
+    free(parts);
+    double left = 0.0, all = 0.0;
+    for (int c = 0; c < 3; ++c) {
+        for (int i = 0; i < work->kept; ++i)
+            work->products[c][newest][i] = work->products[c][i][newest] = sums[i][c];
+        left += sums[newest][c];
+        all += sums[HISTORY][c];
+    }
+    *change = all > 0.0 ? sqrt(left / all) : 0.0;
+    return BRUME_OK;
+}
+
+/* What the next iteration begins with, into work->now. */
+static brume_result mix(struct dom_work *work)
+{
+    const struct program *program;
+    float shares[HISTORY][3] = {{0}};
+    for (int c = 0; c < 3; ++c) {
+        double products[HISTORY][HISTORY], found[HISTORY];
+        for (int i = 0; i < work->kept; ++i)
+            for (int j = 0; j < work->kept; ++j)
+                products[i][j] = work->products[c][work->slots[i]][work->slots[j]];
+        dom_mix_shares(work->kept, products, found);
+        for (int i = 0; i < work->kept; ++i)
+            shares[work->slots[i]][c] = (float)found[i];
+    }
+    TRY(program_compute(&work->cells.input->gpu->programs, "dom_mix", &program));
+    bind_lattice(work);
+    for (int i = 0; i < HISTORY; ++i)
+        glBindTextureUnit((GLuint)(SLOT_HISTORY + i), work->results[i].id);
+    glBindTextureUnit(SLOT_MOMENTS, work->next.id);
+    image(SLOT_OUTPUT, &work->now);
+    glProgramUniform3fv(program->id, 0, HISTORY, shares[0]);
+    return over_field(work, "dom_mix", (ivec4){work->kept, 0, 0, 0});
+}
+
+static brume_result begin(struct dom_work *work)
+{
+    work->kept = 1; /* any slot: the world's light leaves no history */
+    if (has_world(work)) {
+        laps_go(work->cells.laps, BRUME_FIELD_SCATTERED);
+        TRY(sweep(work, true));
+        TRY(gather(work, &work->world, false));
+    }
+    work->kept = 0;
+    laps_go(work->cells.laps, BRUME_FIELD_SCATTERED);
+    bind_lattice(work);
+    glBindTextureUnit(SLOT_MOMENTS, work->world.id);
+    image(SLOT_OUTPUT, &work->first);
+    return over_field(work, "dom_first", (ivec4){has_world(work), 0, 0, 0});
+}
+
+static brume_result iterate(struct dom_work *work, double *change)
+{
+    bind_lattice(work);
+    glBindTextureUnit(SLOT_MOMENTS, work->now.id);
+    glBindTextureUnit(SLOT_MOMENTS + 1, work->first.id);
+    image(SLOT_OUTPUT, &work->sources);
+    TRY(over_field(work, "dom_source", (ivec4){0}));
+    TRY(sweep(work, false));
+    begin_entry(work);
+    TRY(gather(work, &work->next, true));
+    return compare(work, change);
+}
+
+static brume_result solve(struct dom_work *work)
+{
+    brume_stats *stats = work->cells.input->stats;
+    const int wanted = work->cells.input->settings->iterations;
+    const int most = wanted > 0 ? wanted : MOST_ITERATIONS;
+    laps_go(work->cells.laps, BRUME_FIELD_ITERATIONS);
+    for (int i = 0; i < most; ++i) {
+        double change = 0.0;
+        work->cells.passes.done = 1.0f + 0.5f * (float)i / (float)(wanted > 0 ? wanted : i + 12);
+        TRY(iterate(work, &change));
+        ++stats->iterations;
+        stats->change = change;
+        TRY(mix(work));
+        if (wanted <= 0 && change < CONVERGED)
+            break;
+    }
+    return BRUME_OK;
+}
+
+static brume_result hand_over(struct dom_work *work, struct transport *transport)
+{
+    laps_go(work->cells.laps, BRUME_FIELD_COPY);
+    bind_lattice(work);
+    glBindTextureUnit(SLOT_MOMENTS, work->now.id);
+    glBindTextureUnit(SLOT_MOMENTS + 1, work->world.id);
+    glBindTextureUnit(SLOT_WALLS, work->cells.walls.id);
+    image(SLOT_OUTPUT, &transport->field);
+    image(SLOT_OUTPUT + 1, &transport->light);
+    return over_field(work, "dom_finish", (ivec4){has_world(work), 0, 0, 0});
+}
+
+static brume_result find(struct dom_work *work, struct transport *transport)
+{
+    TRY(prepare(work));
+    TRY(begin(work));
+    TRY(solve(work));
+    return hand_over(work, transport);
+}
+
+/* --- All of it ------------------------------------------------------------------------------ */
+
+static brume_result make_product(struct transport *transport, const struct transport_input *input)
+{
+    struct memory *memory = &input->gpu->memory;
+    const struct gpu_field *field = &input->frame->fields[0];
+    const ivec4 dims = field->dims;
+    TRY(texture_ensure(memory, &transport->field, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA32F,
+                       texture_side(4 * dims.x), texture_side(dims.y), texture_side(dims.z), 1,
+                       "field"));
+    TRY(texture_ensure(memory, &transport->light, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
+                       texture_side(MOMENT_SIDE * dims.x), texture_side(MOMENT_SIDE * dims.y),
+                       texture_side(dims.z), 1, "moments"));
+    TRY(texture_ensure(memory, &transport->scattered, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
+                       texture_side(dims.x), texture_side(dims.y), texture_side(dims.z), 1,
+                       "scattered towards the eye"));
+    return buffer_update(memory, &transport->level, FOR_TRANSPORT, sizeof *field, field, "lattice");
+}
+
+brume_result dom_run(struct transport *transport, const struct transport_input *input)
+{
+    TRY(opv_run(transport, input));
+    if (!input->frame->field.x)
+        return BRUME_OK;
+    transport->eye = 0;
+    TRY(make_product(transport, input));
+    transport_bind(transport); /* depths, as OPV has just found them */
+    struct laps laps = {.sums_ms = input->stats->field_ms};
+    struct dom_work work = {
+        .cells = {.input = input,
+                  .field = &input->frame->fields[0],
+                  .product = &transport->field,
+                  .laps = &laps,
+                  .passes = {.input = input, .done = 1.0f}},
+        .count = input->settings->ordinates,
+    };
+    const brume_result result = find(&work, transport);
+    finish(&work);
+    laps_end(&laps);
+    return result;
+}
+
+/* Where the eye is, or for a parallel view which way it looks. */
+static uint64_t eye_signature(const struct gpu_frame *frame)
+{
+    const vec4 x = frame->ray_direction_x;
+    const bool parallel = x.x == 0.0f && x.y == 0.0f && x.z == 0.0f;
+    const vec4 at = parallel ? frame->ray_direction : frame->ray_origin;
+    const float eye[4] = {at.x, at.y, at.z, parallel};
+    const uint64_t hash = hash_bytes(HASH_START, eye, sizeof eye);
+    return hash ? hash : 1;
+}
+
+brume_result dom_look(struct gpu *gpu, struct transport *transport, const struct gpu_frame *frame)
+{
+    const struct program *program;
+    const ivec4 dims = frame->fields[0].dims;
+    const uint64_t eye = eye_signature(frame);
+    if (transport->eye == eye)
+        return BRUME_OK;
+    TRY(program_compute(&gpu->programs, "dom_eye", &program));
+    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL, transport->level.id);
+    glBindTextureUnit(SLOT_MOMENTS, transport->light.id);
+    image(SLOT_OUTPUT, &transport->scattered);
+    program_dispatch(program, dims.x, dims.y, dims.z);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    transport->eye = eye;
+    return BRUME_OK;
+}

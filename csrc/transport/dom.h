@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What the stages of DOM share. Device thread. */
+#ifndef BRUME_TRANSPORT_DOM_H
+#define BRUME_TRANSPORT_DOM_H
+
+#include "transport/lpv.h"
+
+/* Bytes of a cell: what the view takes light from, what is needed while that is found, and of this
+ * for each ordinate. */
+#define DOM_CELL_BYTES (FIELD_CELL_BYTES + 8 * MOMENTS + 8)
+#define DOM_WORKING_BYTES (24 * MOMENTS + HISTORY * 16 * MOMENT_SIDE + 24 + 8 + 48 + 40)
+#define DOM_ORDINATE_BYTES 24
+
+/* The ordinates of a quadrature with so many, 26, 48 or 96, sorted by their major axes: directions
+ * and weights, sr. docs/methods/dom.md says what they integrate exactly. Returns how many have each
+ * axis. */
+void dom_quadrature(int count, vec4 directions[MOST_ORDINATES], int axes[3]);
+
+/* Shares of the results of `count` iterations, 1 together, that make their residuals' sum least;
+ * from the residuals' products. Any thread. */
+void dom_mix_shares(int count, double products[HISTORY][HISTORY], double shares[HISTORY]);
+
+#endif

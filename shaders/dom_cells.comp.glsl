@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a cell of the field's lattice is filled with, means over the cell: the media's extinction, their
+// albedo and mean cosine, the reflectance of the surfaces in it, and all links that these cut. Strong
+// forward scattering counts as none, as everywhere with DOM: extinction comes scaled.
+#version 450 core
+#include "lib/medium.glsl"
+#include "lib/level.glsl"
+#include "lib/harmonics.glsl"
+
+layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
+
+layout(std140, binding = SLOT_STAGE) uniform stage_block
+{
+    gpu_lattice_pass stage;
+};
+
+layout(binding = SLOT_WALLS) uniform usampler3D wall_sums;
+layout(binding = SLOT_LINKS) uniform usampler3D links;
+
+layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D cell_image[3]; // extinction; albedo,
+                                                       // mean cosine; surfaces' reflectance
+layout(binding = SLOT_OUTPUT_FIELD, r32ui) writeonly uniform uimage3D cuts_image;
+
+const int POINTS = 128; // along the lattice
+
+void main()
+{
+    ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
+    if (!in_level(cell) || cell.z >= stage.slab.w)
+        return;
+    float side = level.lower.w;
+    vec3 lower = level.lower.xyz + vec3(cell) * side;
+    vec3 extinct = vec3(0.0), scatter = vec3(0.0);
+    float g_sum = 0.0, g_weight = 0.0;
+    if (medium_exists()) {
+        int points = points_in_cell(POINTS, 4);
+        int all = points * points * points;
+        for (int i = 0; i < all; ++i) {
+            vec3 p = lower + (vec3(i % points, i / points % points, i / (points * points)) + 0.5) *
+                                 (side / float(points));
+            if (!in_box(p, frame.medium_lower.xyz, frame.medium_upper.xyz))
+                continue;
+            vec3 uvw = medium_coordinate(p);
+            vec4 s = textureLod(medium_scatter, uvw, 0.0);
+            extinct += textureLod(medium_extinct, uvw, 0.0).rgb;
+            scatter += s.rgb * (1.0 - forward_share(s.a));
+            g_sum += s.a * luminance(s.rgb);
+            g_weight += luminance(s.rgb);
+        }
+        extinct /= float(all);
+        scatter /= float(all);
+        g_sum /= float(all);
+        g_weight /= float(all);
+    }
+    if (fog_exists()) {
+        vec3 filled = clamp((min(frame.fog_upper.xyz, lower + side) -
+                             max(frame.fog_lower.xyz, lower)) / side, 0.0, 1.0);
+        float part = filled.x * filled.y * filled.z, g = frame.fog_sigma_s.w;
+        extinct += part * frame.fog_sigma_t.rgb;
+        scatter += part * (1.0 - forward_share(g)) * frame.fog_sigma_s.rgb;
+        g_sum += part * g * luminance(frame.fog_sigma_s.rgb);
+        g_weight += part * luminance(frame.fog_sigma_s.rgb);
+    }
+    ivec3 texel = ivec3(WALL_TEXELS * cell.x, cell.yz);
+    vec4 walls = vec4(texelFetch(wall_sums, texel, 0).r,
+                      texelFetch(wall_sums, texel + ivec3(1, 0, 0), 0).r,
+                      texelFetch(wall_sums, texel + ivec3(2, 0, 0), 0).r,
+                      texelFetch(wall_sums, texel + ivec3(3, 0, 0), 0).r);
+    uint cuts = texelFetch(links, links_texel(cell), 0).r;
+    for (int i = 0; i < 13; ++i)
+        cuts |= (texelFetch(links, links_texel(cell - LINKS[i]), 0).r >> i & 1u) << (13 + i);
+    extinct = clamp(extinct, vec3(0.0), vec3(65504.0));
+    imageStore(cell_image[0], cell, vec4(extinct, 0.0));
+    imageStore(cell_image[1], cell, vec4(clamp(scatter / max(extinct, vec3(1e-12)), 0.0, 1.0),
+                                         g_sum / max(g_weight, 1e-12)));
+    imageStore(cell_image[2], cell, vec4(walls.rgb / (255.0 * max(walls.a, 1.0)), 0.0));
+    imageStore(cuts_image, cell, uvec4(cuts, 0u, 0u, 0u));
+}

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The source that iterations begin with: of every cell what its medium scatters of the lamps' own light
+// and of the world's, and what it emits. In units of radiance: per extinction.
+#version 450 core
+#include "lib/transmittance.glsl"
+#include "lib/shadow.glsl"
+#include "lib/ordinates.glsl"
+#include "lib/harmonics.glsl"
+#include "lib/spread.glsl"
+
+layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
+
+layout(std140, binding = SLOT_STAGE) uniform stage_block
+{
+    gpu_lattice_pass stage; // offset.x: 1: the world's own light is known
+};
+
+layout(binding = SLOT_CELL_EXTINCT) uniform sampler3D cell_extinct;
+layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_albedo;
+layout(binding = SLOT_MOMENTS) uniform sampler3D world_moments;
+
+layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D first_image;
+
+const int POINTS = 64; // along the lattice
+
+// What the media scatter in a cube of side `part` around a point, of all lamps' light, and emit.
+void add_point(inout vec3 q[MOMENTS], vec3 p, float part, uint lot)
+{
+    vec3 sigma_s = vec3(0.0), extinct = vec3(0.0), emission = vec3(0.0);
+    float g = 0.0;
+    if (medium_exists() && in_box(p, frame.medium_lower.xyz, frame.medium_upper.xyz)) {
+        vec3 uvw = medium_coordinate(p);
+        vec4 scatter = textureLod(medium_scatter, uvw, 0.0);
+        sigma_s = scatter.rgb;
+        g = scatter.a;
+        extinct = textureLod(medium_extinct, uvw, 0.0).rgb;
+        if (frame.medium_upper.w != 0.0)
+            emission = textureLod(medium_emission, uvw, 0.0).rgb;
+    }
+    if (fog_exists() && in_box(p, frame.fog_lower.xyz, frame.fog_upper.xyz)) {
+        add_fog(sigma_s, g);
+        extinct += frame.fog_sigma_t.rgb;
+        emission += frame.fog_emission.rgb;
+    }
+    q[0] += emission * sqrt(4.0 * PI);
+    if (sigma_s == vec3(0.0))
+        return;
+    sigma_s *= 1.0 - forward_share(g);
+    vec4 bands = scaled_bands(g);
+    for (uint i = 0u; i < frame.counts.x; ++i) {
+        gpu_light light = lights[i];
+        gpu_light_sample s = light_samples[light.samples.x + lot % light.samples.y];
+        vec3 towards;
+        float square;
+        vec3 intensity = light_intensity(light, s.position.xyz, p, towards, square);
+        bool sun = light.info.x == uint(LIGHT_SUN);
+        float distance = sun ? 1e30 : sqrt(square);
+        if (intensity == vec3(0.0))
+            continue;
+        intensity *= light_shadow_medium(light, s, p, distance) * light.factors.z;
+        if (intensity == vec3(0.0))
+            continue;
+        if (!sun)
+            intensity *= mean_inverse_square(square, part);
+        vec3 depth = light_depth(light, p, towards, distance);
+        vec3 scattered = intensity * mean_transmittance(depth, extinct, towards, part) * sigma_s;
+        float y[MOMENTS];
+        harmonics(-towards, y);
+        for (int m = 0; m < MOMENTS; ++m)
+            q[m] += scattered * (bands[band_of(m)] * y[m]);
+    }
+}
+
+void main()
+{
+    ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
+    if (!in_level(cell) || cell.z >= stage.slab.w)
+        return;
+    vec3 extinct = texelFetch(cell_extinct, cell, 0).rgb;
+    vec3 q[MOMENTS];
+    for (int m = 0; m < MOMENTS; ++m)
+        q[m] = vec3(0.0);
+    float side = level.lower.w;
+    if (extinct != vec3(0.0)) {
+        uint start = hash(uint(cell.x) + hash(uint(cell.y) + hash(uint(cell.z))));
+        int points = points_in_cell(POINTS, 4);
+        float part = side / float(points);
+        for (int i = 0; i < points * points * points; ++i) {
+            vec3 p = level.lower.xyz + vec3(cell) * side +
+                     (vec3(i % points, i / points % points, i / (points * points)) + 0.5) * part;
+            add_point(q, p, part, start + uint(i));
+        }
+        // A source in a cell that dims next to nothing would be next to infinite.
+        vec3 per = 1.0 / (float(points * points * points) * max(extinct, vec3(1e-4 / side)));
+        for (int m = 0; m < MOMENTS; ++m)
+            q[m] *= per;
+        if (stage.offset.x != 0) {
+            vec4 scatter = texelFetch(cell_albedo, cell, 0);
+            vec4 bands = scaled_bands(scatter.w);
+            for (int m = 0; m < MOMENTS; ++m)
+                q[m] += scatter.rgb * bands[band_of(m)] *
+                        texelFetch(world_moments, moment_texel(cell, m), 0).rgb;
+        }
+    }
+    for (int m = 0; m < MOMENTS; ++m)
+        imageStore(first_image, moment_texel(cell, m), fit(q[m], 0.0));
+}

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which of a cell's 26 links surfaces cut: bits, by their numbers.
+#include "lib/links.glsl"
+
+// Numbers of links by their offsets, x first; 31: there is none to the cell itself.
+const uint NUMBERS[27] = uint[](
+    22u, 20u, 12u, 18u, 15u, 6u, 24u, 8u, 10u, 16u, 14u, 4u, 13u, 31u,
+    0u, 17u, 1u, 3u, 23u, 21u, 11u, 19u, 2u, 5u, 25u, 7u, 9u);
+
+uint link_bit(ivec3 offset)
+{
+    return 1u << NUMBERS[9 * offset.z + 3 * offset.y + offset.x + 13];
+}
+
+// Whether a surface cuts the link from a cell with those cut links, by the offset to its neighbour.
+bool is_cut(uint cuts, ivec3 offset)
+{
+    return (cuts & link_bit(offset)) != 0u;
+}

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// DOM's ordinates, and where the light along each stands in the textures: a tile of the lattice each.
+#include "lib/level.glsl"
+
+#ifdef ORDINATES_WRITTEN
+layout(std430, binding = SLOT_ORDINATES) buffer ordinates_block
+#else
+layout(std140, binding = SLOT_ORDINATES) uniform ordinates_block
+#endif
+{
+    gpu_ordinates ordinates;
+};
+
+ivec3 ordinate_texel(ivec3 cell, int number)
+{
+    return cell + ivec3(0, number / ordinates.count.y, number % ordinates.count.y) *
+                      ivec3(0, level.dims.yz);
+}
+
+ivec3 moment_texel(ivec3 cell, int moment)
+{
+    return cell + ivec3(moment % MOMENT_SIDE, moment / MOMENT_SIDE, 0) * ivec3(level.dims.xy, 0);
+}
+
+// The cell of a slice across an axis, `along` it.
+ivec3 placed(int axis, int along, ivec2 at)
+{
+    return axis == 0 ? ivec3(along, at) : (axis == 1 ? ivec3(at.y, along, at.x) : ivec3(at, along));
+}
+
+// A direction's own axes: the major one first.
+vec3 turned(int axis, vec3 way)
+{
+    return axis == 0 ? way.xyz : (axis == 1 ? way.yzx : way.zxy);
+}
+
+// A column of light leaves a slice for up to four cells of the next: straight on, and aside along the
+// slice's axes or not.
+ivec2 aside_of(int number)
+{
+    return ivec2(number & 1, number >> 1);
+}
+
+// A colour as half floats hold it: they end at 65504, and what a driver does with the bits that they lack
+// is its own affair. Software cuts them off, which would dim light by 0.02 % in every slice of cells.
+vec4 fit(vec3 value, float w)
+{
+    vec3 within = clamp(value, vec3(-65504.0), vec3(65504.0));
+    return vec4(uintBitsToFloat((floatBitsToUint(within) + 0x1000u) & 0xffffe000u), w);
+}
+
+// The axis that light along a direction goes along most: it passes the lattice slice by slice of that.
+int major_axis(vec3 way)
+{
+    vec3 a = abs(way);
+    return a.x >= a.y && a.x >= a.z ? 0 : (a.y >= a.z ? 1 : 2);
+}

@@ -1,0 +1,410 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* DOM against exact numbers: its quadratures, slabs, a cube that a beam lights, a deep medium,
+ * furnaces; and that nothing becomes negative or infinite whatever the scene is. */
+#include "field.h"
+
+#include "transport/dom.h"
+
+#define PI 3.14159265358979
+
+static const float down[3] = {0, 0, -1};
+
+static brume_settings settings_for(int cells)
+{
+    return (brume_settings){.method = BRUME_METHOD_DOM,
+                            .medium_resolution = 32,
+                            .lattice_resolution = 32,
+                            .field_resolution = cells,
+                            .ordinates = 48,
+                            .step = 0.5f,
+                            .shadow_resolution = 64,
+                            .light_samples = 1,
+                            .world_samples = 64};
+}
+
+/* --- Quadratures ---------------------------------------------------------------------------- */
+
+/* The mean of x^2a y^2b z^2c over the sphere. */
+static double even_mean(int a, int b, int c)
+{
+    return tgamma(a + 0.5) * tgamma(b + 0.5) * tgamma(c + 0.5) /
+           (tgamma(a + b + c + 1.5) * 2.0 * PI);
+}
+
+static void quadratures(void **state)
+{
+    (void)state;
+    static const struct {
+        int count, degree;
+        double half; /* how far off |x| may be */
+    } cases[] = {{26, 7, 0.1}, {48, 7, 1e-6}, {96, 9, 1e-6}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        vec4 list[MOST_ORDINATES];
+        int axes[3];
+        dom_quadrature(cases[i].count, list, axes);
+        assert_int_equal(axes[0] + axes[1] + axes[2], cases[i].count);
+        double half = 0.0;
+        for (int k = 0; k < cases[i].count; ++k) {
+            assert_true(list[k].w > 0.0f);
+            half += (double)list[k].w * fabs((double)list[k].x) / (4.0 * PI);
+        }
+        assert_close(half, 0.5, cases[i].half);
+        for (int a = 0; 2 * a <= cases[i].degree; ++a)
+            for (int b = 0; 2 * (a + b) <= cases[i].degree; ++b)
+                for (int c = 0; 2 * (a + b + c) <= cases[i].degree; ++c) {
+                    double mean = 0.0;
+                    for (int k = 0; k < cases[i].count; ++k)
+                        mean += (double)list[k].w / (4.0 * PI) * pow((double)list[k].x, 2 * a) *
+                                pow((double)list[k].y, 2 * b) * pow((double)list[k].z, 2 * c);
+                    assert_close(mean, even_mean(a, b, c), 1e-5);
+                }
+    }
+}
+
+/* --- What media send out -------------------------------------------------------------------- */
+
+/* Gauss and Legendre's points on [0, 1] and their weights. */
+#define ANGLES 6
+static const double gauss[ANGLES][2] = {
+    {0.033765242898424, 0.085662246189585}, {0.169395306766868, 0.180380786524069},
+    {0.380690406958402, 0.233956967286346}, {0.619309593041598, 0.233956967286346},
+    {0.830604693233132, 0.180380786524069}, {0.966234757101576, 0.085662246189585}};
+
+/* The radiance that a medium sends out at a point of its surface, to an eye far away. */
+static double sent(brume_scene *scene, const brume_settings *settings, const float from[3],
+                   const float out[3])
+{
+    const float along[3] = {-out[0], -out[1], -out[2]};
+    brume_view view = orthographic_view(from, along, 1e-4f, 5.0f, 1);
+    view.samples = 2;
+    view.passes = 1u << BRUME_PASS_VOLUME_DIRECT | 1u << BRUME_PASS_VOLUME_INDIRECT;
+    brume_job *job = render(scene, settings, &view);
+    float *direct = read_pass(job, &view, BRUME_PASS_VOLUME_DIRECT);
+    float *indirect = read_pass(job, &view, BRUME_PASS_VOLUME_INDIRECT);
+    const double radiance = (double)direct[0] + (double)indirect[0];
+    free(direct);
+    free(indirect);
+    brume_job_release(job);
+    return radiance;
+}
+
+/* Power per area that leaves at a point of a face across an axis, upwards or downwards; directions
+ * turn by quarters of `turns`. */
+static double leaves(brume_scene *scene, const brume_settings *settings, const float from[3],
+                     int axis, float sign, int turns)
+{
+    double sum = 0.0;
+    for (int i = 0; i < ANGLES; ++i)
+        for (int k = 0; k < turns; ++k) {
+            const double cosine = gauss[i][0], sine = sqrt(1.0 - cosine * cosine);
+            const double turn = (k + 0.3) * 2.0 * PI / turns;
+            float out[3];
+            out[axis] = sign * (float)cosine;
+            out[(axis + 1) % 3] = (float)(sine * cos(turn));
+            out[(axis + 2) % 3] = (float)(sine * sin(turn));
+            sum += 2.0 * PI * cosine * gauss[i][1] / turns * sent(scene, settings, from, out);
+        }
+    return sum;
+}
+
+/* --- Slabs ---------------------------------------------------------------------------------- */
+
+struct slab {
+    double g, tau, albedo, reflected, passed;
+    int wide, across; /* m, cells of its thickness */
+};
+
+/* Of a slab 1 m thick and 3 m wide, between white walls on four sides, which lose nothing: as a
+ * slab without end. Exact numbers: van de Hulst 1980 (g 0.75, tau 2, albedo 0.9: Table 35), the
+ * others by adding and doubling, which gives his to 3e-6. */
+static void slabs(void **state)
+{
+    (void)state;
+    static const struct slab rows[] = {
+        {0.0, 1.0, 0.9, 0.26741, 0.59163, 3, 16},   {0.0, 4.0, 1.0, 0.69093, 0.30907, 3, 16},
+        {0.0, 16.0, 0.99, 0.75126, 0.02960, 1, 32}, {0.75, 2.0, 0.9, 0.09739, 0.66096, 3, 16},
+        {0.75, 8.0, 1.0, 0.50642, 0.49358, 3, 16},
+    };
+    static const float top[3] = {0.11f, 0.07f, 0.5f}, bottom[3] = {0.11f, 0.07f, -0.5f};
+    static const uint32_t sides[24] = {0, 1, 5, 0, 5, 4, 2, 3, 7, 2, 7, 6,
+                                       0, 2, 6, 0, 6, 4, 1, 3, 7, 1, 7, 5};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
+        const struct slab *row = &rows[i];
+        brume_settings settings = settings_for(row->wide * row->across);
+        settings.medium_resolution = settings.lattice_resolution = row->wide * 32;
+        const float s = (float)(row->tau * row->albedo), a = (float)row->tau - s;
+        const struct coefficients c = {
+            .sigma_s = {s, s, s}, .sigma_a = {a, a, a}, .g = (float)row->g};
+        brume_scene *scene = empty();
+        struct fog_cube cube;
+        fog_cube_init(&cube, origin, 0.5f, &c);
+        for (int k = 0; k < 8; ++k) {
+            cube.positions[3 * k] *= (float)row->wide;
+            cube.positions[3 * k + 1] *= (float)row->wide;
+        }
+        assert_ok(brume_scene_set_volume(scene, 1, &cube.volume));
+        add_matt(scene, 2, "walls", 1.0f, identity, cube.positions, 8, sides, 8);
+        add_sun(scene, 3, down);
+        const double r = leaves(scene, &settings, top, 2, 1.0f, 2);
+        const double t = leaves(scene, &settings, bottom, 2, -1.0f, 2) + exp(-row->tau);
+        print_message("slab, g %.2f tau %g albedo %g: R %+.4f T %+.4f\n", row->g, row->tau,
+                      row->albedo, r - row->reflected, t - row->passed);
+        assert_true(fabs(r - row->reflected) < 0.02);
+        assert_true(fabs(t - row->passed) < 0.02);
+        brume_scene_destroy(scene);
+    }
+}
+
+/* --- A cube that a beam lights -------------------------------------------------------------- */
+
+#define PHOTONS 400000
+#define AXIS_CELLS 16
+
+/* What a beam that falls onto the cube's upper side does: Monte Carlo. */
+struct beam {
+    double fluences[AXIS_CELLS]; /* in the middle of the cube, from above, by the irradiance */
+    double above, below, aside;  /* shares that leave by each side; all but straight on */
+};
+
+static double lot(uint64_t *state)
+{
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    return ((double)(*state >> 11) + 0.5) / 9007199254740992.0;
+}
+
+/* Henyey and Greenstein's phase function about the direction. */
+static void scatter(double d[3], double g, uint64_t *state)
+{
+    const double u = lot(state), turn = 2.0 * PI * lot(state);
+    const double part = fabs(g) < 1e-3 ? 0.0 : (1.0 - g * g) / (1.0 - g + 2.0 * g * u);
+    const double cosine = fabs(g) < 1e-3 ? 1.0 - 2.0 * u : (1.0 + g * g - part * part) / (2.0 * g);
+    const double sine = sqrt(fmax(1.0 - cosine * cosine, 0.0));
+    double x[3], y[3];
+    const double *other = fabs(d[2]) < 0.9 ? (const double[]){0, 0, 1} : (const double[]){1, 0, 0};
+    double length = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        x[i] = other[(i + 1) % 3] * d[(i + 2) % 3] - other[(i + 2) % 3] * d[(i + 1) % 3];
+        length += x[i] * x[i];
+    }
+    for (int i = 0; i < 3; ++i)
+        x[i] /= sqrt(length);
+    for (int i = 0; i < 3; ++i)
+        y[i] = d[(i + 1) % 3] * x[(i + 2) % 3] - d[(i + 2) % 3] * x[(i + 1) % 3];
+    for (int i = 0; i < 3; ++i)
+        d[i] = cosine * d[i] + sine * (cos(turn) * x[i] + sin(turn) * y[i]);
+}
+
+/* sigma_s of a cube of 1 m that absorbs nothing. */
+static struct beam trace(double sigma_s, double g)
+{
+    struct beam beam = {{0}, 0, 0, 0};
+    uint64_t state = 88172645463325252u;
+    const double half = 1.0 / AXIS_CELLS; /* of the column in the middle */
+    for (int i = 0; i < PHOTONS; ++i) {
+        double p[3] = {lot(&state) - 0.5, lot(&state) - 0.5, 0.5}, d[3] = {0, 0, -1};
+        for (int hits = 0;; ++hits) {
+            const double way = -log(lot(&state)) / sigma_s;
+            double end = INFINITY;
+            int side = 0;
+            for (int axis = 0; axis < 3; ++axis) {
+                const double to =
+                    d[axis] != 0.0 ? ((d[axis] > 0 ? 0.5 : -0.5) - p[axis]) / d[axis] : INFINITY;
+                if (to < end) {
+                    end = to;
+                    side = axis;
+                }
+            }
+            if (way >= end) {
+                *(side != 2  ? &beam.aside
+                  : d[2] > 0 ? &beam.above
+                             : &beam.below) += hits ? 1.0 / PHOTONS : 0.0;
+                break;
+            }
+            for (int axis = 0; axis < 3; ++axis)
+                p[axis] += way * d[axis];
+            if (fabs(p[0]) < half && fabs(p[1]) < half)
+                beam.fluences[(int)((0.5 - p[2]) * AXIS_CELLS)] +=
+                    AXIS_CELLS / (sigma_s * PHOTONS * 4.0 * half * half);
+            scatter(d, g, &state);
+        }
+    }
+    return beam;
+}
+
+static void cube(void **state)
+{
+    (void)state;
+    static const float gs[] = {0.0f, 0.5f, 0.7f};
+    static const double thirds[3][2] = {
+        {0.112701665379258, 5.0 / 18.0}, {0.5, 8.0 / 18.0}, {0.887298334620742, 5.0 / 18.0}};
+    const brume_settings settings = settings_for(32);
+    for (size_t i = 0; i < sizeof gs / sizeof *gs; ++i) {
+        const float g = gs[i];
+        const struct coefficients c = {.sigma_s = {4, 4, 4}, .g = g};
+        const struct beam truth = trace(4.0, (double)g);
+        brume_scene *scene = empty();
+        add_fog_cube(scene, 1, origin, 0.5f, &c);
+        add_sun(scene, 2, down);
+        brume_stats stats;
+        struct field field = field_of(scene, &settings, &stats);
+        print_message("cube, g %.1f, %u iterations: fluence", (double)g, stats.iterations);
+        const double scaled = 4.0 * (1.0 - pow((double)g, 4.0));
+        double off = 0.0, all = 0.0;
+        for (int k = 0; k < AXIS_CELLS; ++k) {
+            const double depth = (k + 0.5) / AXIS_CELLS;
+            const float p[3] = {0, 0, (float)(0.5 - depth)};
+            const double found = fluence_at(&field, p, 0) + exp(-scaled * depth);
+            print_message(" %+.3f", found / truth.fluences[k] - 1.0);
+            off += fabs(found - truth.fluences[k]);
+            all += truth.fluences[k];
+        }
+        double out[3] = {0};
+        static const int axes[3] = {2, 2, 0};
+        static const float signs[3] = {1, -1, 1};
+        for (int face = 0; face < 3; ++face)
+            for (int u = 0; u < 3; ++u)
+                for (int v = 0; v < 3; ++v) {
+                    float p[3];
+                    p[axes[face]] = 0.5f * signs[face];
+                    p[(axes[face] + 1) % 3] = (float)thirds[u][0] - 0.5f;
+                    p[(axes[face] + 2) % 3] = (float)thirds[v][0] - 0.5f;
+                    out[face] += thirds[u][1] * thirds[v][1] *
+                                 leaves(scene, &settings, p, axes[face], signs[face], 4);
+                }
+        out[2] *= 4.0;
+        print_message("; above %+.4f below %+.4f aside %+.4f\n", out[0] - truth.above,
+                      out[1] - truth.below, out[2] - truth.aside);
+        assert_true(off < 0.04 * all);
+        assert_true(fabs(out[0] - truth.above) < 0.01);
+        assert_true(fabs(out[1] - truth.below) < 0.01);
+        assert_true(fabs(out[2] - truth.aside) < 0.04); /* four sides */
+        free(field.texels);
+        brume_scene_destroy(scene);
+    }
+}
+
+/* --- Furnaces ------------------------------------------------------------------------------- */
+
+/* In an even world a medium that absorbs nothing cannot be seen; nor one that emits what it
+ * absorbs. */
+static void furnaces(void **state)
+{
+    (void)state;
+    static const struct {
+        float sigma_s, sigma_a, g;
+    } cases[] = {{0.5f, 0, 0}, {2, 0, 0},    {8, 0, 0}, {2, 0, 0.6f},
+                 {8, 0, 0.9f}, {2, 1, 0.3f}, {0, 3, 0}, {2, 0, -0.6f}};
+    const brume_world world = {.color = {1, 1, 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        const float s = cases[i].sigma_s, a = cases[i].sigma_a;
+        const struct coefficients fog = {
+            .sigma_s = {s, s, s}, .sigma_a = {a, a, a}, .emission = {a, a, a}, .g = cases[i].g};
+        brume_settings settings = settings_for(32);
+        settings.medium_resolution = 64;
+        brume_view view = orthographic_view(origin, (float[3]){0.3f, -1, 0.2f}, 0.8f, 5.0f, 16);
+        view.samples = 16;
+        brume_scene *scene = empty();
+        add_fog_cube(scene, 1, origin, 0.5f, &fog);
+        assert_ok(brume_scene_set_world(scene, &world));
+        brume_job *job = render(scene, &settings, &view);
+        float *pixels = read_pass(job, &view, BRUME_PASS_COMBINED);
+        double mean = 0.0, least = 1e9, most = 0.0;
+        for (int p = 0; p < 256; ++p) {
+            mean += (double)pixels[4 * p] / 256.0;
+            least = fmin(least, (double)pixels[4 * p]);
+            most = fmax(most, (double)pixels[4 * p]);
+        }
+        print_message("furnace, sigma_s %g, sigma_a %g, g %g: %.4f (%.4f to %.4f)\n", (double)s,
+                      (double)a, (double)fog.g, mean, least, most);
+        assert_close(mean, 1.0, 0.005);
+        free(pixels);
+        brume_job_release(job);
+        brume_scene_destroy(scene);
+    }
+}
+
+/* --- Iterations ----------------------------------------------------------------------------- */
+
+/* A thick cube that absorbs nothing. */
+static void thick(void **state)
+{
+    (void)state;
+    const struct coefficients fog = {.sigma_s = {24, 12, 6}};
+    brume_settings settings = settings_for(16);
+    brume_stats stats;
+    brume_scene *scene = empty();
+    add_fog_cube(scene, 1, origin, 0.5f, &fog);
+    add_sun(scene, 2, down);
+    struct field early = field_of(scene, &settings, &stats);
+    settings.iterations = 100;
+    struct field late = field_of(scene, &settings, NULL);
+    double off = 0.0, all = 0.0;
+    for (int z = 0; z < 16; ++z)
+        for (int y = 0; y < 16; ++y)
+            for (int x = 0; x < 16; ++x) {
+                const int cell[3] = {x, y, z};
+                off += fabs(fluence(&early, cell, 0) - fluence(&late, cell, 0));
+                all += fluence(&late, cell, 0);
+            }
+    print_message("optical thickness 24: %u iterations, %.2f %% off\n", stats.iterations,
+                  100.0 * off / all);
+    assert_true(stats.iterations <= 40);
+    assert_true(off < 0.02 * all);
+    free(early.texels);
+    free(late.texels);
+    brume_scene_destroy(scene);
+}
+
+/* --- Hostile scenes ------------------------------------------------------------------------- */
+
+static void assert_sound_picture(brume_scene *scene, const brume_settings *settings)
+{
+    brume_view view = orthographic_view(origin, (float[3]){0.3f, -0.2f, -1}, 3.0f, 5.0f, 32);
+    brume_job *job = render(scene, settings, &view);
+    float *pixels = read_pass(job, &view, BRUME_PASS_COMBINED);
+    for (int i = 0; i < 4 * 32 * 32; ++i)
+        if (!isfinite(pixels[i]) || pixels[i] < 0.0f)
+            fail_msg("pixel %d has %g", i / 4, (double)pixels[i]);
+    free(pixels);
+    brume_job_release(job);
+}
+
+static void nothing_odd_comes_out(void **state)
+{
+    (void)state;
+    static const struct coefficients media[] = {
+        {.sigma_s = {5, 5, 5}, .g = -0.9f},
+        {.sigma_s = {5, 5, 5}, .g = 0.98f},
+        {.sigma_a = {5, 1, 0}},
+        {.sigma_s = {16000, 1e-5f, 0}, .sigma_a = {0, 1e-5f, 16000}, .g = 0.5f},
+        {.sigma_s = {1e-6f, 0, 0}, .emission = {3, 0, 0}},
+        {.g = 0.0f},
+    };
+    static const float lamps[][3] = {{0.1f, 0.2f, 0.1f}, {50, 0, 0}, {0, 0, -0.7f}};
+    const brume_settings settings = settings_for(16);
+    for (size_t i = 0; i < sizeof media / sizeof *media; ++i)
+        for (size_t k = 0; k < sizeof lamps / sizeof *lamps; ++k) {
+            const brume_world world = {.color = {0.5f, 0.5f, 0.5f}};
+            brume_scene *scene = empty();
+            add_fog_cube(scene, 1, origin, 0.5f, &media[i]);
+            add_box_at(scene, 2, (float[3]){0, 0, -0.7f}, 0.1f, 0.9f); /* the last lamp is in it */
+            if (k != 1)
+                assert_ok(brume_scene_set_world(scene, &world));
+            assert_sound_picture(scene, &settings); /* without a lamp */
+            add_lamp(scene, 3, lamps[k], 100.0f);
+            assert_sound_picture(scene, &settings);
+            brume_scene_destroy(scene);
+        }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(quadratures), cmocka_unit_test(furnaces),
+        cmocka_unit_test(thick),       cmocka_unit_test(slabs),
+        cmocka_unit_test(cube),        cmocka_unit_test(nothing_odd_comes_out),
+    };
+    return cmocka_run_group_tests(tests, open_device, close_device);
+}

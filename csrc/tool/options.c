@@ -71,12 +71,15 @@ static const char help[] =
     "      --depths WAY            optical depths to the lamps: propagated (the default), marched\n"
     "                              (exact, slower); corrected or paper, to compare\n"
     "      --method METHOD         opv: light that media scatter once (the default); lpv: and what\n"
-    "                              they and surfaces go on to scatter\n"
-    "      --field-resolution N    lpv: cells along the longest side of the lattice in which that\n"
-    "                              goes on (default: half of --lattice-resolution)\n"
+    "                              they and surfaces go on to scatter, softly; dom: the same, right\n"
+    "                              to a few percent\n"
+    "      --field-resolution N    lpv, dom: cells along the longest side of the lattice in which\n"
+    "                              that goes on (default: half of --lattice-resolution)\n"
     "      --cascades N            lpv: such lattices, each within the last around the medium, half\n"
     "                              as long with as many cells (1 to 3, default: 1)\n"
-    "      --iterations N          lpv: how many cells far (default: until it converged)\n"
+    "      --ordinates N           dom: directions that light goes along, 26, 48 or 96 (default: 48)\n"
+    "      --iterations N          lpv: how many cells far; dom: how often it is scattered anew\n"
+    "                              (default: until it converged)\n"
     "      --blockers KIND         what keeps LPV's light from passing surfaces: links (exact,\n"
     "                              the default) or fuzzy (as published, leaks; to compare)\n"
     "      --memory-budget MIB     on the GPU (default: 2048)\n"
@@ -399,7 +402,22 @@ static bool parse_method(const char *option, const char *text, options *out)
             out->settings.method = method;
             return true;
         }
-    usage_error("--%s wants opv or lpv, not '%s'", option, text);
+    usage_error("--%s wants opv, lpv or dom, not '%s'", option, text);
+    return false;
+}
+
+static bool parse_ordinates(const char *option, const char *text, options *out)
+{
+    static const int counts[] = {26, 48, 96};
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; ++i) {
+        char name[8];
+        snprintf(name, sizeof name, "%d", counts[i]);
+        if (strcmp(text, name) == 0) {
+            out->settings.ordinates = counts[i];
+            return true;
+        }
+    }
+    usage_error("--%s wants 26, 48 or 96, not '%s'", option, text);
     return false;
 }
 
@@ -491,7 +509,7 @@ static const struct spec specs[] = {
     {"method", KIND_OWN, .parse = parse_method},
     {"field-resolution", KIND_COUNT, AT(settings.field_resolution), .upper = 256},
     {"cascades", KIND_COUNT, AT(settings.cascades), .upper = 3},
-    {"ordinates", KIND_COUNT, AT(settings.ordinates), .upper = 96},
+    {"ordinates", KIND_OWN, .parse = parse_ordinates},
     {"iterations", KIND_COUNT, AT(settings.iterations), .upper = 100000},
     {"depths", KIND_OWN, .parse = parse_depths},
     {"blockers", KIND_OWN, .parse = parse_blockers},

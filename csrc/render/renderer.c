@@ -229,6 +229,8 @@ static brume_result work_transport(struct run *run)
     };
     if (!renderer->frame.field.x) /* left by another method, or by other paths */
         transport_forget_field(run->gpu, &renderer->transport);
+    else if (request->settings.method != BRUME_METHOD_DOM)
+        transport_forget_moments(run->gpu, &renderer->transport);
     return method->run(&renderer->transport, &input);
 }
 

@@ -167,7 +167,7 @@ static brume_result over_field(struct dom_work *work, const char *stem, ivec4 of
     return BRUME_OK;
 }
 
-/* Without lamps and surfaces, what the world sends into the lattice. */
+/* Whether the world sends light into the lattice. */
 static bool has_world(const struct dom_work *work)
 {
     return work->cells.input->world_count > 0;
@@ -230,6 +230,8 @@ static brume_result sweep(struct dom_work *work, bool world)
             program_dispatch(program, dims[(axis + 1) % 3], dims[(axis + 2) % 3], work->axes[axis]);
         }
         glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+        if (work->cells.input->gpu->context.info.software)
+            glFinish(); /* or a cancel would find all of them in the driver's queue */
     }
     return BRUME_OK;
 }
@@ -239,7 +241,8 @@ static brume_result sweep(struct dom_work *work, bool world)
 static brume_result gather(struct dom_work *work, const struct texture *moments, bool sources)
 {
     bind_lattice(work);
-    const int newest = work->slots[work->kept - 1];
+    const int newest =
+        work->kept ? work->slots[work->kept - 1] : 0; /* the world's leaves no history */
     glBindTextureUnit(SLOT_WALLS, work->cells.cells[2].id);
     glBindTextureUnit(SLOT_ANGULAR, work->means.id);
     glBindTextureUnit(SLOT_HITS, work->hits.id);
@@ -333,13 +336,11 @@ static brume_result mix(struct dom_work *work)
 
 static brume_result begin(struct dom_work *work)
 {
-    work->kept = 1; /* any slot: the world's light leaves no history */
     if (has_world(work)) {
         laps_go(work->cells.laps, BRUME_FIELD_SCATTERED);
         TRY(sweep(work, true));
         TRY(gather(work, &work->world, false));
     }
-    work->kept = 0;
     laps_go(work->cells.laps, BRUME_FIELD_SCATTERED);
     bind_lattice(work);
     glBindTextureUnit(SLOT_MOMENTS, work->world.id);
@@ -373,7 +374,8 @@ static brume_result solve(struct dom_work *work)
         ++stats->iterations;
         stats->change = change;
         TRY(mix(work));
-        if (wanted <= 0 && change < CONVERGED)
+        /* In the first one surfaces only learn what they have to send. */
+        if (wanted <= 0 && i > 0 && change < CONVERGED)
             break;
     }
     return BRUME_OK;

@@ -26,12 +26,17 @@ void transport_bind(const struct transport *transport)
     glBindTextureUnit(SLOT_SCATTERED, transport->scattered.id);
 }
 
-void transport_forget_field(struct gpu *gpu, struct transport *transport)
+void transport_forget_moments(struct gpu *gpu, struct transport *transport)
 {
-    texture_finish(&gpu->memory, &transport->field);
     texture_finish(&gpu->memory, &transport->light);
     texture_finish(&gpu->memory, &transport->scattered);
     buffer_finish(&gpu->memory, &transport->level);
+}
+
+void transport_forget_field(struct gpu *gpu, struct transport *transport)
+{
+    texture_finish(&gpu->memory, &transport->field);
+    transport_forget_moments(gpu, transport);
 }
 
 void transport_finish(struct gpu *gpu, struct transport *transport)

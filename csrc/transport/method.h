@@ -51,6 +51,8 @@ const struct method *method_find(uint32_t number);
 void transport_bind(const struct transport *transport);
 /* What is known of light scattered or reflected. */
 void transport_forget_field(struct gpu *gpu, struct transport *transport);
+/* Of this what DOM alone makes. */
+void transport_forget_moments(struct gpu *gpu, struct transport *transport);
 void transport_finish(struct gpu *gpu, struct transport *transport);
 
 /* The methods. */

@@ -196,6 +196,23 @@ static void scatter(double d[3], double g, uint64_t *state)
         d[i] = cosine * d[i] + sine * (cos(turn) * x[i] + sin(turn) * y[i]);
 }
 
+/* The side of the cube [-half, half]^3 that a ray from within meets: its axis, and how far it is.
+ */
+static int wall_ahead(const double p[3], const double d[3], double half, double *way)
+{
+    int side = 0;
+    *way = INFINITY;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double to =
+            d[axis] != 0.0 ? ((d[axis] > 0 ? half : -half) - p[axis]) / d[axis] : INFINITY;
+        if (to < *way) {
+            *way = to;
+            side = axis;
+        }
+    }
+    return side;
+}
+
 /* sigma_s of a cube of 1 m that absorbs nothing. */
 static struct beam trace(double sigma_s, double g)
 {
@@ -206,16 +223,8 @@ static struct beam trace(double sigma_s, double g)
         double p[3] = {lot(&state) - 0.5, lot(&state) - 0.5, 0.5}, d[3] = {0, 0, -1};
         for (int hits = 0;; ++hits) {
             const double way = -log(lot(&state)) / sigma_s;
-            double end = INFINITY;
-            int side = 0;
-            for (int axis = 0; axis < 3; ++axis) {
-                const double to =
-                    d[axis] != 0.0 ? ((d[axis] > 0 ? 0.5 : -0.5) - p[axis]) / d[axis] : INFINITY;
-                if (to < end) {
-                    end = to;
-                    side = axis;
-                }
-            }
+            double end;
+            const int side = wall_ahead(p, d, 0.5, &end);
             if (way >= end) {
                 *(side != 2  ? &beam.aside
                   : d[2] > 0 ? &beam.above
@@ -357,6 +366,60 @@ static void thick(void **state)
     brume_scene_destroy(scene);
 }
 
+/* --- Rooms ---------------------------------------------------------------------------------- */
+
+/* The mean fluence in the room [-1, 1]^3 of what its matt walls reflect of a lamp's 1 W: Monte
+ * Carlo. */
+static double between_walls(const float lamp[3], double reflectance)
+{
+    uint64_t state = 88172645463325252u;
+    double sum = 0.0;
+    for (int i = 0; i < PHOTONS / 4; ++i) {
+        double p[3] = {lamp[0], lamp[1], lamp[2]}, d[3] = {0, 0, 1}, way;
+        scatter(d, 0.0, &state);
+        for (double weight = 1.0; weight > 1e-4; weight *= reflectance) {
+            const int axis = wall_ahead(p, d, 1.0, &way);
+            sum += weight < 1.0 ? weight * way : 0.0;
+            for (int k = 0; k < 3; ++k)
+                p[k] = fmax(fmin(p[k] + way * d[k], 1.0), -1.0);
+            const double sine = sqrt(lot(&state)), turn = 2.0 * PI * lot(&state);
+            const double inwards = p[axis] > 0.0 ? -1.0 : 1.0;
+            d[axis] = inwards * sqrt(1.0 - sine * sine);
+            d[(axis + 1) % 3] = sine * cos(turn);
+            d[(axis + 2) % 3] = sine * sin(turn);
+        }
+    }
+    return sum / (PHOTONS / 4) / 8.0;
+}
+
+/* A lamp in a closed room without a medium. */
+static void light_between_walls(void **state)
+{
+    (void)state;
+    static const float reflectances[] = {0.2f, 0.6f, 0.8f}; /* whole 255ths, as cells hold them */
+    const brume_settings settings = settings_for(16);
+    for (size_t i = 0; i < sizeof reflectances / sizeof *reflectances; ++i) {
+        static const float lamp[3] = {0.2f, -0.1f, 0.3f};
+        const double rho = (double)reflectances[i];
+        brume_scene *scene = empty();
+        add_box(scene, 1, 1.0f, reflectances[i]);
+        add_lamp(scene, 2, lamp, 1.0f);
+        brume_stats stats;
+        struct field field = field_of(scene, &settings, &stats);
+        double mean = 0.0;
+        for (int z = 0; z < 16; ++z)
+            for (int y = 0; y < 16; ++y)
+                for (int x = 0; x < 16; ++x)
+                    mean += fluence(&field, (const int[3]){x, y, z}, 0) / (16.0 * 16.0 * 16.0);
+        const double truth = between_walls(lamp, rho);
+        print_message("walls of %.1f, %u iterations: mean fluence %+.2f %%\n", rho,
+                      stats.iterations, 100.0 * (mean / truth - 1.0));
+        assert_close(mean, truth, 0.03);
+        free(field.texels);
+        brume_scene_destroy(scene);
+    }
+}
+
 /* --- Hostile scenes ------------------------------------------------------------------------- */
 
 static void assert_sound_picture(brume_scene *scene, const brume_settings *settings)
@@ -402,9 +465,13 @@ static void nothing_odd_comes_out(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(quadratures), cmocka_unit_test(furnaces),
-        cmocka_unit_test(thick),       cmocka_unit_test(slabs),
-        cmocka_unit_test(cube),        cmocka_unit_test(nothing_odd_comes_out),
+        cmocka_unit_test(quadratures),
+        cmocka_unit_test(furnaces),
+        cmocka_unit_test(thick),
+        cmocka_unit_test(slabs),
+        cmocka_unit_test(cube),
+        cmocka_unit_test(light_between_walls),
+        cmocka_unit_test(nothing_odd_comes_out),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

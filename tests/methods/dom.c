@@ -111,7 +111,8 @@ static double leaves(brume_scene *scene, const brume_settings *settings, const f
 
 struct slab {
     double g, tau, albedo, reflected, passed;
-    int wide, across; /* m, cells of its thickness */
+    double wide; /* m */
+    int across;  /* cells of its thickness */
 };
 
 /* Of a slab 1 m thick and 3 m wide, between white walls on four sides, which lose nothing: as a
@@ -121,8 +122,8 @@ static void slabs(void **state)
 {
     (void)state;
     static const struct slab rows[] = {
-        {0.0, 1.0, 0.9, 0.26741, 0.59163, 3, 16},   {0.0, 4.0, 1.0, 0.69093, 0.30907, 3, 16},
-        {0.0, 16.0, 0.99, 0.75126, 0.02960, 1, 32}, {0.75, 2.0, 0.9, 0.09739, 0.66096, 3, 16},
+        {0.0, 1.0, 0.9, 0.26741, 0.59163, 3, 16},     {0.0, 4.0, 1.0, 0.69093, 0.30907, 3, 16},
+        {0.0, 16.0, 0.99, 0.75126, 0.02960, 0.5, 32}, {0.75, 2.0, 0.9, 0.09739, 0.66096, 3, 16},
         {0.75, 8.0, 1.0, 0.50642, 0.49358, 3, 16},
     };
     static const float top[3] = {0.11f, 0.07f, 0.5f}, bottom[3] = {0.11f, 0.07f, -0.5f};
@@ -130,8 +131,9 @@ static void slabs(void **state)
                                        0, 2, 6, 0, 6, 4, 1, 3, 7, 1, 7, 5};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
         const struct slab *row = &rows[i];
-        brume_settings settings = settings_for(row->wide * row->across);
-        settings.medium_resolution = settings.lattice_resolution = row->wide * 32;
+        const double longest = fmax(row->wide, 1.0);
+        brume_settings settings = settings_for((int)(longest * row->across));
+        settings.medium_resolution = settings.lattice_resolution = (int)(longest * 32.0);
         const float s = (float)(row->tau * row->albedo), a = (float)row->tau - s;
         const struct coefficients c = {
             .sigma_s = {s, s, s}, .sigma_a = {a, a, a}, .g = (float)row->g};
@@ -446,7 +448,8 @@ static void nothing_odd_comes_out(void **state)
         {.g = 0.0f},
     };
     static const float lamps[][3] = {{0.1f, 0.2f, 0.1f}, {50, 0, 0}, {0, 0, -0.7f}};
-    const brume_settings settings = settings_for(16);
+    brume_settings settings = settings_for(16);
+    settings.iterations = 6; /* what is wrong is so at once */
     for (size_t i = 0; i < sizeof media / sizeof *media; ++i)
         for (size_t k = 0; k < sizeof lamps / sizeof *lamps; ++k) {
             const brume_world world = {.color = {0.5f, 0.5f, 0.5f}};

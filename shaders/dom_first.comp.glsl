@@ -51,17 +51,10 @@ void add_point(inout vec3 q[MOMENTS], vec3 p, float part, uint lot)
         gpu_light light = lights[i];
         gpu_light_sample s = light_samples[light.samples.x + lot % light.samples.y];
         vec3 towards;
-        float square;
-        vec3 intensity = light_intensity(light, s.position.xyz, p, towards, square);
-        bool sun = light.info.x == uint(LIGHT_SUN);
-        float distance = sun ? 1e30 : sqrt(square);
+        float distance;
+        vec3 intensity = light_in_cube(light, s, p, part, towards, distance);
         if (intensity == vec3(0.0))
             continue;
-        intensity *= light_shadow_medium(light, s, p, distance) * light.factors.z;
-        if (intensity == vec3(0.0))
-            continue;
-        if (!sun)
-            intensity *= mean_inverse_square(square, part);
         vec3 depth = light_depth(light, p, towards, distance);
         vec3 scattered = intensity * mean_transmittance(depth, extinct, towards, part) * sigma_s;
         float y[MOMENTS];
@@ -86,8 +79,7 @@ void main()
         int points = points_in_cell(POINTS, 4);
         float part = side / float(points);
         for (int i = 0; i < points * points * points; ++i) {
-            vec3 p = level.lower.xyz + vec3(cell) * side +
-                     (vec3(i % points, i / points % points, i / (points * points)) + 0.5) * part;
+            vec3 p = point_in_cell(cell, i, points);
             add_point(q, p, part, start + uint(i));
         }
         // A source in a cell that dims next to nothing would be next to infinite.

@@ -33,8 +33,7 @@ void main()
         int points = points_in_cell(POINTS, 4);
         int all = points * points * points;
         for (int i = 0; i < all; ++i) {
-            vec3 p = lower + (vec3(i % points, i / points % points, i / (points * points)) + 0.5) *
-                                 (side / float(points));
+            vec3 p = point_in_cell(cell, i, points);
             if (!in_box(p, frame.medium_lower.xyz, frame.medium_upper.xyz))
                 continue;
             vec3 uvw = medium_coordinate(p);

@@ -44,17 +44,10 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
         gpu_light light = lights[i];
         gpu_light_sample s = light_samples[light.samples.x + lot % light.samples.y];
         vec3 towards;
-        float square;
-        vec3 intensity = light_intensity(light, s.position.xyz, p, towards, square);
-        bool sun = light.info.x == uint(LIGHT_SUN);
-        float distance = sun ? 1e30 : sqrt(square);
+        float distance;
+        vec3 intensity = light_in_cube(light, s, p, part, towards, distance);
         if (intensity == vec3(0.0))
             continue;
-        intensity *= light_shadow_medium(light, s, p, distance) * light.factors.z;
-        if (intensity == vec3(0.0))
-            continue;
-        if (!sun)
-            intensity *= mean_inverse_square(square, part);
         vec3 power = intensity * light_transmittance(light, p, towards, distance) * sigma_s * volume;
         for (int c = 0; c < 3; ++c)
             flow[c] += power[c] * vec4(1.0, -g * towards);
@@ -82,8 +75,7 @@ void begin(ivec3 cell)
         float part = side / float(points);
         for (int i = 0; i < points * points * points; ++i) {
             // No lots: what is turned by a right angle is lit alike.
-            vec3 p = level.lower.xyz + vec3(cell) * side +
-                     (vec3(i % points, i / points % points, i / (points * points)) + 0.5) * part;
+            vec3 p = point_in_cell(cell, i, points);
             add_scattered(flow, p, part, start + uint(i));
         }
     }

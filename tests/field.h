@@ -121,6 +121,19 @@ static void assert_sound(const struct field *field)
                     }
 }
 
+/* Looks down on the scene, and finds no pixel negative or infinite. */
+static void assert_sound_picture(brume_scene *scene, const brume_settings *settings)
+{
+    brume_view view = orthographic_view(origin, (float[3]){0.3f, -0.2f, -1}, 3.0f, 5.0f, 32);
+    brume_job *job = render(scene, settings, &view);
+    float *pixels = read_pass(job, &view, BRUME_PASS_COMBINED);
+    for (int i = 0; i < 4 * 32 * 32; ++i)
+        if (!isfinite(pixels[i]) || pixels[i] < 0.0f)
+            fail_msg("pixel %d has %g", i / 4, (double)pixels[i]);
+    free(pixels);
+    brume_job_release(job);
+}
+
 static brume_scene *empty(void)
 {
     brume_scene *scene;

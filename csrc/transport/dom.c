@@ -432,7 +432,6 @@ brume_result dom_run(struct transport *transport, const struct transport_input *
     struct dom_work work = {
         .cells = {.input = input,
                   .field = &input->frame->fields[0],
-                  .product = &transport->field,
                   .laps = &laps,
                   .passes = {.input = input, .done = 1.0f}},
         .count = input->settings->ordinates,

@@ -20,7 +20,7 @@ struct medium_textures {
 #define MEDIUM_CELL_BYTES 30
 
 /* Of what is scattered with a mean cosine, the share that counts as not scattered at all, where strong
- * forward scattering is scaled away (delta-M; forward_share of shaders/lib/harmonics.glsl). */
+ * forward scattering is scaled away (delta-M; forward_share of shaders/lib/phase.glsl). */
 float medium_forward_share(float g);
 /* Brings the lattice's values within what half floats hold, and uploads them. scaled: extinction
  * without that share of sigma_s. */

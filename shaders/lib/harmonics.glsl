@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Real spherical harmonics of bands 0 to 3, orthonormal, in the order l(l+1)+m.
 #include "shared/brume_gpu.h"
+#include "lib/phase.glsl"
 
 void harmonics(vec3 d, out float y[MOMENTS])
 {
@@ -29,13 +30,7 @@ int band_of(int moment)
     return moment < 1 ? 0 : (moment < 4 ? 1 : (moment < 9 ? 2 : 3));
 }
 
-// Moments of Henyey and Greenstein's phase function by bands, scaled: the share f = g^4 of what is
-// scattered counts as not scattered at all (Wiscombe, "The Delta-M Method", J. Atmos. Sci. 1977, eq. 14).
-float forward_share(float g)
-{
-    return g * g * g * g;
-}
-
+// Moments of Henyey and Greenstein's phase function by bands, scaled.
 vec4 scaled_bands(float g)
 {
     float f = forward_share(g);

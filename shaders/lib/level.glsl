@@ -20,6 +20,13 @@ int points_in_cell(int in_all, int most)
     return clamp((in_all + longest - 1) / longest, 1, most);
 }
 
+// The place of one of them, of so many along a side.
+vec3 point_in_cell(ivec3 cell, int number, int points)
+{
+    vec3 within = vec3(number % points, number / points % points, number / (points * points)) + 0.5;
+    return level.lower.xyz + (vec3(cell) + within / float(points)) * level.lower.w;
+}
+
 // Where a cell stands in a picture of a lattice with its layers as tiles, so many in a row.
 ivec2 tiled_texel(ivec3 cell, ivec3 dims, int row)
 {

@@ -164,7 +164,7 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
                 sum += transmittance * step_weight(m.sigma_t, through, dt) * here * phase;
             } else {
                 float soft = phase_truncated(cosine, m.g);
-                vec3 sigma_t = m.sigma_t + m.g * m.g * m.g * m.g * m.sigma_s;
+                vec3 sigma_t = m.sigma_t + forward_share(m.g) * m.sigma_s;
                 vec3 sharp_through = exp(-sigma_t * dt);
                 sum += here * (transmittance * step_weight(m.sigma_t, through, dt) * soft +
                                sharp * step_weight(sigma_t, sharp_through, dt) * (phase - soft));
@@ -172,7 +172,7 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
         }
         transmittance *= through;
         if (frame.paths.z != 0)
-            sharp *= exp(-(m.sigma_t + m.g * m.g * m.g * m.g * m.sigma_s) * dt);
+            sharp *= exp(-(m.sigma_t + forward_share(m.g) * m.sigma_s) * dt);
     }
     return sum * light.factors.z;
 }

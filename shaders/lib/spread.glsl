@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A lamp's light over what is not a point.
+#include "lib/shadow.glsl"
 
 // The mean of 1/d^2 over a cube of that side around a point, to the second order (its Laplacian is
 // 2/d^4), and no more than over a cube around the lamp itself.
@@ -7,6 +8,20 @@ float mean_inverse_square(float square, float side)
 {
     float s = side * side;
     return min((1.0 + s / (12.0 * square)) / square, 7.7 / s);
+}
+
+// What a lamp's sample sends into a cube of that side around a point, past surfaces but not through media:
+// its mean there, W/m^2. towards: unit vector to the lamp; distance: how far it is.
+vec3 light_in_cube(gpu_light light, gpu_light_sample s, vec3 p, float side, out vec3 towards,
+                   out float distance)
+{
+    float square;
+    vec3 intensity = light_intensity(light, s.position.xyz, p, towards, square) * light.factors.z;
+    bool sun = light.info.x == uint(LIGHT_SUN);
+    distance = sun ? 1e30 : sqrt(square);
+    if (intensity != vec3(0.0))
+        intensity *= light_shadow_medium(light, s, p, distance);
+    return sun ? intensity : intensity * mean_inverse_square(square, side);
 }
 
 // The mean of exp(-depth) over a cube of that side, of a depth at its middle that grows by extinct a

@@ -20,6 +20,8 @@ layout(binding = SLOT_LINKS) uniform usampler3D links;
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D cell_image[3]; // extinction; albedo,
                                                        // mean cosine; surfaces' reflectance
 layout(binding = SLOT_OUTPUT_FIELD, r32ui) writeonly uniform uimage3D cuts_image;
+layout(binding = SLOT_OUTPUT_FIELD + 1, rgba16f) writeonly uniform image3D depths_image; // of cells, by
+                                             // what turns light off its way; not below THINNEST
 
 const int POINTS = 128; // along the lattice
 
@@ -70,8 +72,11 @@ void main()
         cuts |= (texelFetch(links, links_texel(cell - LINKS[i]), 0).r >> i & 1u) << (13 + i);
     extinct = clamp(extinct, vec3(0.0), vec3(65504.0));
     imageStore(cell_image[0], cell, vec4(extinct, 0.0));
-    imageStore(cell_image[1], cell, vec4(clamp(scatter / max(extinct, vec3(1e-12)), 0.0, 1.0),
-                                         g_sum / max(g_weight, 1e-12)));
+    vec3 albedo = clamp(scatter / max(extinct, vec3(1e-12)), 0.0, 1.0);
+    float g = g_sum / max(g_weight, 1e-12);
+    imageStore(cell_image[1], cell, vec4(albedo, g));
+    vec3 turns = extinct * (1.0 - albedo * scaled_bands(g).y) * side;
+    imageStore(depths_image, cell, vec4(clamp(turns, vec3(THINNEST), vec3(65504.0)), 0.0));
     imageStore(cell_image[2], cell, vec4(walls.rgb / (255.0 * max(walls.a, 1.0)), 0.0));
     imageStore(cuts_image, cell, uvec4(cuts, 0u, 0u, 0u));
 }

@@ -35,7 +35,7 @@ void main()
     vec3 sums[HISTORY + 1];
     for (int i = 0; i <= HISTORY; ++i)
         sums[i] = vec3(0.0);
-    for (int x = 0; x < level.dims.x * MOMENT_SIDE; ++x) {
+    for (int x = 0; x < level.dims.x * MIXED; ++x) {
         ivec3 texel = ivec3(x, row);
         vec3 own = residual(stage.offset.x, texel);
         for (int i = 0; i < HISTORY; ++i)

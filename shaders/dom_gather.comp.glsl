@@ -18,16 +18,16 @@ layout(binding = SLOT_WALLS) uniform sampler3D cell_reflectance;
 layout(binding = SLOT_ANGULAR) uniform sampler3D means;
 layout(binding = SLOT_HITS) uniform sampler3D hits;
 layout(binding = SLOT_MOMENTS) uniform sampler3D moments; // that the iteration began with
+layout(binding = SLOT_CELL_WALLS) uniform sampler3D cell_walls; // radiance that it began with
 layout(binding = SLOT_REFLECTED) uniform sampler2D reflected[3];
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D moments_image;
-layout(binding = SLOT_OUTPUT + 1, rgba16f) writeonly uniform image3D wall_image;
-layout(binding = SLOT_OUTPUT + 2, rgba16f) writeonly uniform image3D residual_image;
-layout(binding = SLOT_OUTPUT + 3, rgba16f) writeonly uniform image3D result_image;
+layout(binding = SLOT_OUTPUT + 1, rgba16f) writeonly uniform image3D residual_image;
+layout(binding = SLOT_OUTPUT + 2, rgba16f) writeonly uniform image3D result_image;
 
 // The radiance of a cell's surfaces: they send out, over the links that they cut, what meets them there,
 // by their reflectance, and what they reflect of the lights' own light.
-vec3 wall_radiance(ivec3 cell, uint cuts)
+vec3 wall_radiance(ivec3 cell)
 {
     vec3 meets = vec3(0.0);
     float area = 0.0; // times pi, in faces of cells
@@ -45,6 +45,12 @@ vec3 wall_radiance(ivec3 cell, uint cuts)
                       texelFetch(reflected[2], texel, 0).x);
     return (texelFetch(cell_reflectance, cell, 0).rgb * meets +
             first / (level.lower.w * level.lower.w)) / area;
+}
+
+void keep(ivec3 texel, vec3 result, vec3 before)
+{
+    imageStore(residual_image, texel, fit(result - before, 0.0));
+    imageStore(result_image, texel, fit(result, 0.0));
 }
 
 void main()
@@ -69,12 +75,10 @@ void main()
         imageStore(moments_image, moment_texel(cell, m), fit(sums[m], 0.0));
     if (stage.offset.x == 0)
         return;
-    for (int m = 0; m < MOMENT_SIDE; ++m) {
+    for (int m = 0; m < MIXED - 1; ++m) {
         vec3 before = texelFetch(moments, moment_texel(cell, m), 0).rgb;
-        imageStore(residual_image, moment_texel(cell, m), fit(sums[m] - before, 0.0));
-        imageStore(result_image, moment_texel(cell, m), fit(sums[m], 0.0));
+        keep(mixed_texel(cell, m), sums[m], before);
     }
-    uint cuts = texelFetch(cell_cuts, cell, 0).r;
-    if (cuts != 0u)
-        imageStore(wall_image, cell, fit(wall_radiance(cell, cuts), 0.0));
+    if (texelFetch(cell_cuts, cell, 0).r != 0u)
+        keep(mixed_texel(cell, MIXED - 1), wall_radiance(cell), texelFetch(cell_walls, cell, 0).rgb);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the next iteration begins with: bands 0 and 1 from all results that are kept, so mixed that their
+// What the next iteration begins with: bands 0 and 1, and the radiance of surfaces, from all results that are kept, so mixed that their
 // residuals all but cancel (Anderson, "Iterative Procedures for Nonlinear Integral Equations", J. ACM
 // 1965; Walker and Ni, "Anderson Acceleration for Fixed-Point Iterations", SIAM J. Numer. Anal. 2011);
 // the others follow from these at once.
@@ -19,6 +19,16 @@ layout(binding = SLOT_HISTORY) uniform sampler3D results[HISTORY];
 layout(binding = SLOT_MOMENTS) uniform sampler3D newest;
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D moments_image;
+layout(binding = SLOT_OUTPUT + 1, rgba16f) writeonly uniform image3D wall_image;
+
+vec4 mixed(ivec3 cell, int number)
+{
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < HISTORY; ++i)
+        if (i < stage.offset.x)
+            sum += shares[i] * texelFetch(results[i], mixed_texel(cell, number), 0).rgb;
+    return fit(sum, 0.0);
+}
 
 void main()
 {
@@ -27,14 +37,8 @@ void main()
         return;
     for (int m = 0; m < MOMENTS; ++m) {
         ivec3 texel = moment_texel(cell, m);
-        vec3 value = vec3(0.0);
-        if (m < MOMENT_SIDE) {
-            for (int i = 0; i < HISTORY; ++i)
-                if (i < stage.offset.x)
-                    value += shares[i] * texelFetch(results[i], texel, 0).rgb;
-        } else {
-            value = texelFetch(newest, texel, 0).rgb;
-        }
-        imageStore(moments_image, texel, fit(value, 0.0));
+        vec4 value = m < MIXED - 1 ? mixed(cell, m) : texelFetch(newest, texel, 0);
+        imageStore(moments_image, texel, value);
     }
+    imageStore(wall_image, cell, mixed(cell, MIXED - 1));
 }

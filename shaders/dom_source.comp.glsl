@@ -38,6 +38,6 @@ void main()
             vec4 y = ordinates.list[k].harmonics[i];
             sum += y.x * q[4 * i] + y.y * q[4 * i + 1] + y.z * q[4 * i + 2] + y.w * q[4 * i + 3];
         }
-        imageStore(source_image, ordinate_texel(cell, k), fit(sum * medium, medium));
+        imageStore(source_image, ordinate_texel(cell, k), fit_along(sum * medium, medium, cell, k));
     }
 }

@@ -99,8 +99,8 @@ void main()
     vec3 mean = mix(source.rgb + (enters - leaves) / max(depth, vec3(1e-6)),
                     enters * (1.0 - 0.5 * depth) + source.rgb * (0.5 * depth),
                     lessThan(depth, vec3(3e-3)));
-    imageStore(slice_image, ivec3(at, number), fit(leaves, 0.0));
-    imageStore(mean_image, ordinate_texel(cell, number), fit(mean, 0.0));
+    imageStore(slice_image, ivec3(at, number), fit_along(leaves, 0.0, cell, number));
+    imageStore(mean_image, ordinate_texel(cell, number), fit_along(mean, 0.0, cell, number));
     for (int i = cuts != 0u && pass.w == 0 ? 0 : 1; i < 1; ++i)
         imageStore(hits_image, ordinate_texel(cell, number), fit(leaves * stopped, stopped));
 }

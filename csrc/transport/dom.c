@@ -13,9 +13,11 @@
 #include <string.h>
 
 #define MOST_ITERATIONS 100
-/* Of the radiance's bands 0 and 1, root of the mean square: what an iteration may change in the
- * end. */
-#define CONVERGED 5e-4
+/* What is yet to find of bands 0 and 1 and of surfaces' radiance, root of the mean square: it may
+ * be so much in the end; or no less than so many iterations before, when rounding is all that is
+ * left. */
+#define CONVERGED 1e-3
+#define STALLED 4
 
 struct dom_work {
     struct lpv_work cells; /* the lattice: what it is filled with, and its surfaces */
@@ -25,9 +27,10 @@ struct dom_work {
     struct texture sources, means, hits; /* by ordinates */
     struct texture slices[2];            /* what leaves a slice of cells */
     struct texture cuts, wall;           /* all links that surfaces cut; these surfaces' radiance */
+    struct texture depths, missing[3];   /* for diffusion: of cells; the fluence, by steps */
     struct texture first, world, now, next; /* moments: of the first source, of the world's own
                                                light, of what an iteration begins with, and finds */
-    struct texture residuals[HISTORY], results[HISTORY]; /* of bands 0 and 1 */
+    struct texture residuals[HISTORY], results[HISTORY]; /* bands 0, 1, surfaces */
     int slots[HISTORY], kept;                            /* which of these, from the oldest on */
     double products[3][HISTORY][HISTORY];                /* of residuals, by slots, colours apart */
 };
@@ -39,6 +42,12 @@ static brume_result lattice_texture(struct dom_work *work, struct texture *textu
     return texture_init(&work->cells.input->gpu->memory, texture, FOR_TRANSPORT, GL_TEXTURE_3D,
                         format, texture_side(across * dims.x), texture_side(up * dims.y),
                         texture_side(deep * dims.z), 1, label);
+}
+
+static void clear(const struct texture *texture)
+{
+    static const float nothing[4];
+    glClearTexImage(texture->id, 0, GL_RGBA, GL_FLOAT, nothing);
 }
 
 static brume_result make_cells(struct dom_work *work)
@@ -111,9 +120,15 @@ static brume_result make_moments(struct dom_work *work)
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         TRY(lattice_texture(work, all[i], GL_RGBA16F, MOMENT_SIDE, MOMENT_SIDE, 1, "moments"));
     for (int i = 0; i < HISTORY; ++i) {
-        TRY(lattice_texture(work, &work->residuals[i], GL_RGBA16F, MOMENT_SIDE, 1, 1, "residuals"));
-        TRY(lattice_texture(work, &work->results[i], GL_RGBA16F, MOMENT_SIDE, 1, 1, "results"));
+        TRY(lattice_texture(work, &work->residuals[i], GL_RGBA16F, MIXED, 1, 1, "residuals"));
+        TRY(lattice_texture(work, &work->results[i], GL_RGBA16F, MIXED, 1, 1, "results"));
+        /* Cells without surfaces never write theirs. */
+        clear(&work->residuals[i]);
+        clear(&work->results[i]);
     }
+    TRY(lattice_texture(work, &work->depths, GL_RGBA16F, 1, 1, 1, "cells' depths"));
+    for (size_t i = 0; i < sizeof work->missing / sizeof *work->missing; ++i)
+        TRY(lattice_texture(work, &work->missing[i], GL_RGBA16F, 1, 1, 1, "diffusion"));
     const ivec4 dims = work->cells.field->dims;
     return buffer_init(&work->cells.input->gpu->memory, &work->dots, FOR_TRANSPORT,
                        (size_t)dims.y * (size_t)dims.z * (HISTORY + 1) * sizeof(vec4), NULL,
@@ -124,10 +139,11 @@ static void finish(struct dom_work *work)
 {
     struct memory *memory = &work->cells.input->gpu->memory;
     struct lpv_work *cells = &work->cells;
-    struct texture *all[] = {&work->sources,   &work->means, &work->hits, &work->slices[0],
-                             &work->slices[1], &work->cuts,  &work->wall, &work->first,
-                             &work->world,     &work->now,   &work->next, &cells->links,
-                             &cells->walls};
+    struct texture *all[] = {&work->sources,   &work->means,  &work->hits,       &work->slices[0],
+                             &work->slices[1], &work->cuts,   &work->wall,       &work->first,
+                             &work->world,     &work->now,    &work->next,       &cells->links,
+                             &cells->walls,    &work->depths, &work->missing[0], &work->missing[1],
+                             &work->missing[2]};
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         texture_finish(memory, all[i]);
     for (int i = 0; i < HISTORY; ++i) {
@@ -149,6 +165,13 @@ static void finish(struct dom_work *work)
 static void image(int slot, const struct texture *texture)
 {
     glBindImageTexture((GLuint)slot, texture->id, 0, GL_TRUE, 0, GL_WRITE_ONLY, texture->format);
+}
+
+static int longest_side(const struct dom_work *work)
+{
+    const ivec4 dims = work->cells.field->dims;
+    const int most = dims.x > dims.y ? dims.x : dims.y;
+    return most > dims.z ? most : dims.z;
 }
 
 static void bind_lattice(const struct dom_work *work)
@@ -177,7 +200,6 @@ static brume_result prepare(struct dom_work *work)
 {
     struct lpv_work *cells = &work->cells;
     const struct program *program;
-    static const float nothing[4];
     TRY(make_cells(work));
     TRY(make_ordinates(work));
     TRY(make_moments(work));
@@ -190,6 +212,7 @@ static brume_result prepare(struct dom_work *work)
     for (int c = 0; c < 3; ++c)
         image(SLOT_OUTPUT + c, &cells->cells[c]);
     image(SLOT_OUTPUT_FIELD, &work->cuts);
+    image(SLOT_OUTPUT_FIELD + 1, &work->depths);
     TRY(over_field(work, "dom_cells", (ivec4){0}));
     TRY(lpv_reflect(cells));
     laps_go(cells->laps, BRUME_FIELD_PREPARE);
@@ -197,9 +220,9 @@ static brume_result prepare(struct dom_work *work)
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ORDINATES, work->ordinates.id);
     program_dispatch(program, GROUP_REST * work->count, 1, 1);
     glMemoryBarrier(GL_UNIFORM_BARRIER_BIT);
-    glClearTexImage(work->wall.id, 0, GL_RGBA, GL_FLOAT, nothing);
-    glClearTexImage(work->now.id, 0, GL_RGBA, GL_FLOAT, nothing);
-    glClearTexImage(work->hits.id, 0, GL_RGBA, GL_FLOAT, nothing);
+    clear(&work->wall);
+    clear(&work->now);
+    clear(&work->hits);
     return BRUME_OK;
 }
 
@@ -217,8 +240,7 @@ static brume_result sweep(struct dom_work *work, bool world)
     glBindTextureUnit(SLOT_ANGULAR, work->sources.id);
     image(SLOT_OUTPUT, &work->means);
     image(SLOT_OUTPUT + 2, &work->hits);
-    const int most = dims[0] > dims[1] ? (dims[0] > dims[2] ? dims[0] : dims[2])
-                                       : (dims[1] > dims[2] ? dims[1] : dims[2]);
+    const int most = longest_side(work);
     for (int slice = 0; slice < most; ++slice) {
         TRY(opv_go_on(&work->cells.passes, 0.0f));
         glBindTextureUnit(SLOT_SLICE, work->slices[slice % 2].id);
@@ -236,8 +258,7 @@ static brume_result sweep(struct dom_work *work, bool world)
     return BRUME_OK;
 }
 
-/* The moments of work->means, into `moments`; of light from sources also the history's newest, and
- * the radiance of surfaces. */
+/* The moments of work->means, into `moments`; of light from sources also the history's newest. */
 static brume_result gather(struct dom_work *work, const struct texture *moments, bool sources)
 {
     bind_lattice(work);
@@ -247,10 +268,10 @@ static brume_result gather(struct dom_work *work, const struct texture *moments,
     glBindTextureUnit(SLOT_ANGULAR, work->means.id);
     glBindTextureUnit(SLOT_HITS, work->hits.id);
     glBindTextureUnit(SLOT_MOMENTS, work->now.id);
+    glBindTextureUnit(SLOT_CELL_WALLS, work->wall.id);
     image(SLOT_OUTPUT, moments);
-    image(SLOT_OUTPUT + 1, &work->wall);
-    image(SLOT_OUTPUT + 2, &work->residuals[newest]);
-    image(SLOT_OUTPUT + 3, &work->results[newest]);
+    image(SLOT_OUTPUT + 1, &work->residuals[newest]);
+    image(SLOT_OUTPUT + 2, &work->results[newest]);
     /* Reflected light is bound where moments are. */
     for (int c = 0; c < 3; ++c)
         glBindTextureUnit((GLuint)(SLOT_REFLECTED + c), work->cells.reflected[c].id);
@@ -268,6 +289,48 @@ static void begin_entry(struct dom_work *work)
     const int oldest = work->slots[0];
     memmove(work->slots, work->slots + 1, (HISTORY - 1) * sizeof *work->slots);
     work->slots[HISTORY - 1] = oldest;
+}
+
+static void bind_diffusion(const struct dom_work *work, const struct texture *missing)
+{
+    bind_lattice(work);
+    glBindTextureUnit(SLOT_CELL_DEPTHS, work->depths.id);
+    glBindTextureUnit(SLOT_WALLS, work->cells.cells[2].id);
+    glBindTextureUnit(SLOT_MISSING, missing->id);
+}
+
+/* Adds what the newest result has yet to find where light diffuses, found in as many steps as the
+ * lattice is long: with Chebyshev's weights for the modes that fit into it these leave a tenth. */
+static brume_result diffuse(struct dom_work *work)
+{
+    const struct program *program;
+    const int newest = work->slots[work->kept - 1];
+    const int most = longest_side(work);
+    /* Eigenvalues: of the longest mode that fits into the lattice, and of the shortest. */
+    const double least = 4.0 / ((double)most * most), greatest = 2.0;
+    const double middle = 0.5 * (greatest + least), half = 0.5 * (greatest - least);
+    double weight = half / middle, inertia = 0.0, forward = 1.0 / middle;
+    TRY(program_compute(&work->cells.input->gpu->programs, "dom_diffusion", &program));
+    clear(&work->missing[0]);
+    clear(&work->missing[1]);
+    for (int step = 0; step < most; ++step) {
+        bind_diffusion(work, &work->missing[(step + 1) % 3]);
+        glBindTextureUnit(SLOT_MISSING + 1, work->missing[step % 3].id);
+        glBindTextureUnit(SLOT_MOMENTS, work->residuals[newest].id);
+        image(SLOT_OUTPUT, &work->missing[(step + 2) % 3]);
+        glProgramUniform2f(program->id, 0, (float)inertia, (float)forward);
+        TRY(over_field(work, "dom_diffusion", (ivec4){0}));
+        const double next = 1.0 / (2.0 * middle / half - weight);
+        inertia = next * weight;
+        forward = 2.0 * next / half;
+        weight = next;
+    }
+    bind_diffusion(work, &work->missing[(most + 1) % 3]);
+    glBindImageTexture(SLOT_OUTPUT, work->residuals[newest].id, 0, GL_TRUE, 0, GL_READ_WRITE,
+                       GL_RGBA16F);
+    glBindImageTexture(SLOT_OUTPUT + 1, work->results[newest].id, 0, GL_TRUE, 0, GL_READ_WRITE,
+                       GL_RGBA16F);
+    return over_field(work, "dom_correct", (ivec4){0});
 }
 
 /* The newest residual's products with all that are kept. Into *change its length over the result's.
@@ -330,6 +393,7 @@ static brume_result mix(struct dom_work *work)
         glBindTextureUnit((GLuint)(SLOT_HISTORY + i), work->results[i].id);
     glBindTextureUnit(SLOT_MOMENTS, work->next.id);
     image(SLOT_OUTPUT, &work->now);
+    image(SLOT_OUTPUT + 1, &work->wall);
     glProgramUniform3fv(program->id, 0, HISTORY, shares[0]);
     return over_field(work, "dom_mix", (ivec4){work->kept, 0, 0, 0});
 }
@@ -358,6 +422,7 @@ static brume_result iterate(struct dom_work *work, double *change)
     TRY(sweep(work, false));
     begin_entry(work);
     TRY(gather(work, &work->next, true));
+    TRY(diffuse(work));
     return compare(work, change);
 }
 
@@ -367,15 +432,20 @@ static brume_result solve(struct dom_work *work)
     const int wanted = work->cells.input->settings->iterations;
     const int most = wanted > 0 ? wanted : MOST_ITERATIONS;
     laps_go(work->cells.laps, BRUME_FIELD_ITERATIONS);
-    for (int i = 0; i < most; ++i) {
+    double least = INFINITY;
+    for (int i = 0, best = 0; i < most; ++i) {
         double change = 0.0;
-        work->cells.passes.done = 1.0f + 0.5f * (float)i / (float)(wanted > 0 ? wanted : i + 12);
+        work->cells.passes.done = 1.0f + 0.5f * (float)i / (float)(wanted > 0 ? wanted : i + 6);
         TRY(iterate(work, &change));
         ++stats->iterations;
         stats->change = change;
         TRY(mix(work));
+        if (change < least) {
+            least = change;
+            best = i;
+        }
         /* In the first one surfaces only learn what they have to send. */
-        if (wanted <= 0 && i > 0 && change < CONVERGED)
+        if (wanted <= 0 && i > 0 && (change < CONVERGED || i - best >= STALLED))
             break;
     }
     return BRUME_OK;

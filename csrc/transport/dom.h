@@ -8,7 +8,7 @@
 /* Bytes of a cell: what the view takes light from, what is needed while that is found, and of this
  * for each ordinate. */
 #define DOM_CELL_BYTES (FIELD_CELL_BYTES + 8 * MOMENTS + 8)
-#define DOM_WORKING_BYTES (32 * MOMENTS + HISTORY * 16 * MOMENT_SIDE + 116)
+#define DOM_WORKING_BYTES (32 * MOMENTS + HISTORY * 16 * MIXED + 148)
 #define DOM_ORDINATE_BYTES 24
 
 /* The ordinates of a quadrature with so many, 26, 48 or 96, sorted by their major axes: directions

@@ -22,6 +22,12 @@ ivec3 moment_texel(ivec3 cell, int moment)
     return cell + ivec3(moment % MOMENT_SIDE, moment / MOMENT_SIDE, 0) * ivec3(level.dims.xy, 0);
 }
 
+// The same of what is extrapolated: bands 0 and 1, and the radiance of surfaces.
+ivec3 mixed_texel(ivec3 cell, int number)
+{
+    return cell + ivec3(number * level.dims.x, 0, 0);
+}
+
 // The cell of a slice across an axis, `along` it.
 ivec3 placed(int axis, int along, ivec2 at)
 {
@@ -43,10 +49,25 @@ ivec2 aside_of(int number)
 
 // A colour as half floats hold it: they end at 65504, and what a driver does with the bits that they lack
 // is its own affair. Software cuts them off, which would dim light by 0.02 % in every slice of cells.
-vec4 fit(vec3 value, float w)
+vec4 rounded(vec3 value, float w, uint up)
 {
     vec3 within = clamp(value, vec3(-65504.0), vec3(65504.0));
-    return vec4(uintBitsToFloat((floatBitsToUint(within) + 0x1000u) & 0xffffe000u), w);
+    return vec4(uintBitsToFloat((floatBitsToUint(within) + up) & 0xffffe000u), w);
+}
+
+vec4 fit(vec3 value, float w)
+{
+    return rounded(value, w, 0x1000u);
+}
+
+// The same of light along an ordinate. Rounded to the nearest, even light, which is alike along all of
+// them and in many cells, would be wrong by as much everywhere, and thick media show a thousand times
+// that; so ordinates and cells are rounded up or down by turns.
+vec4 fit_along(vec3 value, float w, ivec3 cell, int number)
+{
+    uint turn = uint(number) * 2654435769u + uint(cell.x) * 3242174889u + uint(cell.y) * 2447445413u +
+                uint(cell.z) * 1831565813u;
+    return rounded(value, w, turn >> 19);
 }
 
 // The axis that light along a direction goes along most: it passes the lattice slice by slice of that.

@@ -87,6 +87,8 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_MOMENTS 34      /* and one more that a stage's shader names */
 #define SLOT_CELL_WALLS 31   /* radiance of the surfaces in a cell */
 #define SLOT_HISTORY 24      /* and three more: residuals, or results */
+#define SLOT_CELL_DEPTHS 24  /* optical depths of cells as diffusion has them */
+#define SLOT_MISSING 25      /* and one more: what an iteration has yet to find, and a step before */
 
 /* Images written by compute passes, and by the drawing of links */
 #define SLOT_OUTPUT 0
@@ -131,11 +133,14 @@ typedef struct mat4 { float m[16]; } mat4;
 
 /* DOM: ordinates, the directions that light is carried along, at most; moments of the radiance, real
  * spherical harmonics of bands 0 to 3, four by four in a texture; of these the first bands, 0 and 1, are
- * extrapolated from so many iterations. */
+ * extrapolated from so many iterations, and with them the radiance of surfaces. */
 #define MOST_ORDINATES 96
 #define MOMENT_SIDE 4
 #define MOMENTS 16
+#define MIXED 5
 #define HISTORY 4
+/* Below this optical depth of a cell light does not diffuse. */
+#define THINNEST 0.25
 
 /* Lights, numbered as brume_light_type of brume.h; the world is one more. */
 #define LIGHT_SUN 0

@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* Raised by every change to a struct, an enumerator or a function below. */
-#define BRUME_ABI 6u
+#define BRUME_ABI 7u
 
 BRUME_API uint32_t brume_abi(void);
 
@@ -485,6 +485,11 @@ typedef struct brume_settings {
                                         many cells; at most 3; 0: 1 */
     uint32_t cascade_focus;          /* brume_focus */
     int32_t ordinates;               /* DOM: directions that light is carried along: 26, 48 or 96; 0: 48 */
+    uint32_t warm;                   /* DOM: 1: iterations begin with the light that the scene had last:
+                                        fewer do, and the picture tells, within `converged`, what was
+                                        rendered before */
+    float converged;                 /* DOM: the share of the light that iterations may leave unfound;
+                                        0: 0.001 */
     uint32_t reserved;
     uint64_t memory_budget;          /* bytes on the GPU; 0: 2 GiB */
 } brume_settings;

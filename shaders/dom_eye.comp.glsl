@@ -25,11 +25,11 @@ void main()
     out_ *= inversesqrt(max(dot(out_, out_), 1e-20));
     float y[MOMENTS];
     harmonics(out_, y);
-    float g = texelFetch(light, cell, 0).w;
+    float g = texelFetch(light, above(cell), 0).w;
     vec4 bands = scaled_bands(g) * (1.0 - forward_share(g));
     vec3 sum = vec3(0.0);
     for (int m = 0; m < MOMENTS; ++m)
-        sum += bands[band_of(m)] * y[m] * texelFetch(light, moment_texel(cell, m), 0).rgb;
-    vec2 cuts = texelFetch(field_lattice, cell + ivec3(3 * level.dims.x, 0, level.dims.w), 0).xy;
-    imageStore(scattered_image, cell, fit(max(sum, vec3(0.0)), cuts == vec2(0.0) ? 0.0 : 1.0));
+        sum += bands[band_of(m)] * y[m] * texelFetch(light, above(moment_texel(cell, m)), 0).rgb;
+    vec2 cuts = texelFetch(field_lattice, above(cell + ivec3(3 * level.dims.x, 0, 0)), 0).xy;
+    imageStore(scattered_image, above(cell), fit(max(sum, vec3(0.0)), cuts == vec2(0.0) ? 0.0 : 1.0));
 }

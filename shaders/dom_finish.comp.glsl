@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The field as surfaces want it, in lpv_finish's form: fluence and flux of light that was scattered or
 // reflected. And all moments of the light that media scatter towards the eye without the lamps: that
-// light and the world's own.
+// light and the world's own. And what surfaces send out, for the next run.
 #version 450 core
 #include "lib/ordinates.glsl"
 
@@ -17,9 +17,11 @@ layout(binding = SLOT_MOMENTS + 1) uniform sampler3D world_moments;
 layout(binding = SLOT_CUTS) uniform usampler3D cell_cuts;
 layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_albedo;
 layout(binding = SLOT_WALLS) uniform usampler3D walls;
+layout(binding = SLOT_CELL_WALLS) uniform sampler3D cell_walls;
 
 layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D field_image;
 layout(binding = SLOT_OUTPUT + 1, rgba16f) writeonly uniform image3D light_image;
+layout(binding = SLOT_OUTPUT + 2, rgba16f) writeonly uniform image3D wall_image;
 
 void main()
 {
@@ -34,14 +36,15 @@ void main()
         vec3 all = own[m];
         if (stage.offset.x != 0)
             all += texelFetch(world_moments, texel, 0).rgb;
-        imageStore(light_image, texel, fit(all, g));
+        imageStore(light_image, above(texel), fit(all, g));
     }
+    imageStore(wall_image, above(cell), texelFetch(cell_walls, cell, 0));
     uint cuts = texelFetch(cell_cuts, cell, 0).r, where = 0u;
     for (int axis = 0; axis < 3; ++axis)
         where |= texelFetch(walls, ivec3(WALL_TEXELS * cell.x + 4 + axis, cell.yz), 0).r
                  << (8 * axis);
     const float fluence = 3.5449077018110318, flux = 2.0466534158929770; // sqrt(4 pi), sqrt(4 pi / 3)
-    ivec3 texel = cell + ivec3(0, 0, level.dims.w);
+    ivec3 texel = above(cell);
     for (int c = 0; c < 3; ++c, texel.x += level.dims.x)
         imageStore(field_image, texel,
                    vec4(fluence * own[0][c], flux * own[3][c], flux * own[1][c], flux * own[2][c]));

@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-ABI = 6
+ABI = 7
 PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONMENT",
           "TRANSMITTANCE", "VOLUME_INDIRECT")
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3, 3)
@@ -164,7 +164,8 @@ class Settings(Structure):
                 ("world_samples", c_int32), ("step", c_float), ("depths", c_uint32),
                 ("light_paths", c_uint32), ("blockers", c_uint32), ("field_resolution", c_int32),
                 ("cascades", c_int32), ("cascade_focus", c_uint32),
-                ("ordinates", c_int32), ("reserved", c_uint32),
+                ("ordinates", c_int32), ("warm", c_uint32),
+                ("converged", c_float), ("reserved", c_uint32),
                 ("memory_budget", c_uint64)]
 
 

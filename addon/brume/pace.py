@@ -19,6 +19,8 @@ FIRST_LEVEL = 2
 _LEVEL_GAIN = 5.0
 # What no level goes below.
 _COARSEST_LATTICE, _COARSEST_SHADOW, _FEWEST_DIRECTIONS = 8, 64, 16
+# The share of scattered light that iterations may leave unfound.
+_ROUGHLY_CONVERGED = 0.03
 # The picture is coarser or finer than the one before only where the time calls for it clearly: a
 # view whose pixels keep changing their size is harder to look at than one that is a little late.
 _TOO_SLOW, _FAST_ENOUGH = 1.25, 0.8
@@ -168,6 +170,7 @@ class SceneQuality:
             settings.world_samples = _halved(settings.world_samples, level, _FEWEST_DIRECTIONS)
             settings.cascades = max(settings.cascades - level, 1)
             settings.ordinates = min(settings.ordinates, 48 if level == 1 else 26)
+            settings.converged = _ROUGHLY_CONVERGED
             if settings.iterations:
                 settings.iterations = _halved(settings.iterations, level, 1)
         if self.medium_level:

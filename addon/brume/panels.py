@@ -74,10 +74,6 @@ class BRUME_PT_single_scattering(_Rows, _RenderPanel, bpy.types.Panel):
     bl_options = {'DEFAULT_CLOSED'}
     rows = ("depths",)
 
-    @classmethod
-    def applies(cls, context):
-        return context.scene.brume.method in {'OPV', 'LPV', 'DOM'}
-
 
 class BRUME_PT_light_propagation(_Rows, _RenderPanel, bpy.types.Panel):
     bl_label = "Light Propagation"
@@ -103,7 +99,7 @@ class BRUME_PT_light_propagation_comparison(_Rows, _RenderPanel, bpy.types.Panel
 class BRUME_PT_discrete_ordinates(_Rows, _RenderPanel, bpy.types.Panel):
     bl_label = "Discrete Ordinates"
     bl_parent_id = "BRUME_PT_volumes"
-    rows = ("field_resolution", "ordinates", "iterations")
+    rows = ("field_resolution", "ordinates", "iterations", "cascades", "cascade_focus")
 
     @classmethod
     def applies(cls, context):

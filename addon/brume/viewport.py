@@ -365,6 +365,7 @@ class View:
                 return
         wish, scene_eval = self.wish, depsgraph.scene_eval
         settings = native_settings(scene_eval.brume)
+        settings.warm = 1  # what moves from picture to picture moves little
         if task.rough and task.size > wish.finest:
             settings.step *= STEP_FACTOR
         if task.look:

@@ -31,6 +31,8 @@ static brume_result check_settings(brume_settings *settings)
     set_default(&settings->world_samples, 128);
     if (settings->step == 0.0f)
         settings->step = 1.0f;
+    if (settings->converged == 0.0f)
+        settings->converged = 1e-3f;
     if (settings->memory_budget == 0)
         settings->memory_budget = 2ull << 30;
     REQUIRE(method_find(settings->method));
@@ -39,6 +41,8 @@ static brume_result check_settings(brume_settings *settings)
     REQUIRE(settings->field_resolution >= 1 && settings->field_resolution <= 256);
     REQUIRE(settings->cascades >= 1 && settings->cascades <= FIELD_LEVELS);
     REQUIRE(settings->ordinates == 26 || settings->ordinates == 48 || settings->ordinates == 96);
+    REQUIRE(settings->warm <= 1);
+    REQUIRE(settings->converged >= 1e-5f && settings->converged <= 1.0f);
     REQUIRE(settings->cascade_focus < BRUME_FOCUS_COUNT);
     REQUIRE(settings->shadow_resolution >= 16 && settings->shadow_resolution <= 8192);
     REQUIRE(settings->light_samples >= 1 && settings->light_samples <= 1024);

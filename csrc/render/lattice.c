@@ -176,23 +176,20 @@ int lattice_wants_field(const brume_settings *settings)
            settings->light_paths != BRUME_PATHS_SINGLE;
 }
 
-/* DOM has one as yet. */
-static int lattice_count(const brume_settings *settings)
+uint64_t lattice_field_bytes(const struct renderer *renderer, const brume_settings *settings)
 {
-    return settings->method == BRUME_METHOD_DOM ? 1 : settings->cascades;
-}
-
-static uint64_t field_bytes(const brume_settings *settings, const struct gpu_field *fields)
-{
+    const struct gpu_frame *frame = &renderer->frame;
     uint64_t each = FIELD_CELL_BYTES + FIELD_WORKING_BYTES +
                     (settings->blockers == BRUME_BLOCKERS_FUZZY ? FIELD_FUZZY_BYTES : 0);
     if (settings->method == BRUME_METHOD_DOM)
         each = DOM_CELL_BYTES + DOM_WORKING_BYTES +
-               (uint64_t)settings->ordinates * DOM_ORDINATE_BYTES;
+               (uint64_t)settings->ordinates *
+                   (DOM_ORDINATE_BYTES + (frame->field.x > 1 ? DOM_AROUND_BYTES : 0));
     uint64_t cells = 0;
-    for (int i = 0; i < lattice_count(settings); ++i)
-        cells += (uint64_t)fields[i].dims.x * (uint64_t)fields[i].dims.y *
-                 (uint64_t)fields[i].dims.z;
+    for (int i = 0; i < frame->field.x; ++i) {
+        const ivec4 dims = frame->fields[i].dims;
+        cells += (uint64_t)dims.x * (uint64_t)dims.y * (uint64_t)dims.z;
+    }
     return cells * each + FIELD_FIXED_BYTES;
 }
 
@@ -309,7 +306,7 @@ static int layout_field(struct renderer *renderer, const struct render_request *
     if (!lattice_wants_field(settings) || box_is_empty(&box))
         return settings->field_resolution;
     int resolution = settings->field_resolution < 2 ? 2 : settings->field_resolution;
-    frame->field.x = lattice_count(settings);
+    frame->field.x = settings->cascades;
     for (;; resolution = resolution * 3 / 4) {
         frame->fields[0] = whole_field(&box, resolution);
         for (int i = 1; i < frame->field.x; ++i) {
@@ -317,8 +314,7 @@ static int layout_field(struct renderer *renderer, const struct render_request *
             focus_of(renderer, request, ldexpf(longest(&box), -i), focus);
             frame->fields[i] = field_within(&frame->fields[i - 1], focus);
         }
-        if (field_bytes(settings, frame->fields) <= renderer->shares.field ||
-            resolution <= 4)
+        if (lattice_field_bytes(renderer, settings) <= renderer->shares.field || resolution <= 4)
             return resolution;
     }
 }

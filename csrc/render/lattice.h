@@ -14,6 +14,8 @@ uint64_t lattice_sky_bytes(const brume_settings *settings);
 /* Fills the world's medium and the lattices of scattered light in renderer->frame, these within their
  * share of the budget. */
 void lattice_place(struct renderer *renderer, const struct render_request *request);
+/* What these take while light is found for them, and afterwards. */
+uint64_t lattice_field_bytes(const struct renderer *renderer, const brume_settings *settings);
 /* After it: fills the other lattice fields of renderer->frame, the tau tiles of the lights, renderer->tau_size.
  * Keeps the transport within its share of the budget, with a warning where that makes it coarser. */
 brume_result lattice_layout(const struct gpu *gpu, struct renderer *renderer,

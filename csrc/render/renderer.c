@@ -231,6 +231,9 @@ static brume_result work_transport(struct run *run)
         transport_forget_field(run->gpu, &renderer->transport);
     else if (request->settings.method != BRUME_METHOD_DOM)
         transport_forget_moments(run->gpu, &renderer->transport);
+    if (lattice_field_bytes(renderer, &request->settings) + transport_field_bytes(&renderer->transport) >
+        renderer->shares.field) /* no room to keep what is there while new light is found */
+        transport_forget_field(run->gpu, &renderer->transport);
     return method->run(&renderer->transport, &input);
 }
 
@@ -381,8 +384,7 @@ static uint64_t product_bytes(const struct renderer *renderer)
     return medium->scatter.bytes + medium->extinct.bytes + medium->emission.bytes +
            medium->bricks.bytes + renderer->shadows.maps.bytes + transport->tau.bytes +
            transport->sky[0].bytes + transport->sky[1].bytes + transport->sky[2].bytes +
-           transport->field.bytes + transport->light.bytes + transport->scattered.bytes +
-           transport->level.bytes;
+           transport_field_bytes(transport);
 }
 
 /* Shares out what pictures, meshes and images leave. What was made under a larger share goes
@@ -525,10 +527,12 @@ static brume_result run_stages(struct run *run)
                                   settings->light_paths == BRUME_PATHS_ALL,
                                   settings->blockers,
                                   (uint64_t)settings->ordinates,
+                                  settings->warm,
+                                  float_bits(settings->converged),
                                   float_bits(snapshot->world.reach),
                                   hash_bytes(HASH_START, renderer->frame.fields,
                                              sizeof renderer->frame.fields)};
-    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 14, work_transport));
+    TRY(run_if_changed(run, BRUME_STAGE_TRANSPORT, transport, 16, work_transport));
     collect_warnings(run);
     return BRUME_OK;
 }

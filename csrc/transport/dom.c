@@ -13,19 +13,21 @@
 #include <string.h>
 
 #define MOST_ITERATIONS 100
-/* What is yet to find of bands 0 and 1 and of surfaces' radiance, root of the mean square: it may
- * be so much in the end; or no less than so many iterations before, when rounding is all that is
- * left. */
-#define CONVERGED 1e-3
+/* Iterations also end when for so many no less was left to find: rounding is all that is left. */
 #define STALLED 4
 
 struct dom_work {
-    struct lpv_work cells; /* the lattice: what it is filled with, and its surfaces */
-    int count, axes[3];    /* ordinates: all, and by their major axes */
-    int across;            /* tiles of theirs along z */
+    struct lpv_work cells;         /* the lattice: what it is filled with, and its surfaces */
+    const struct dom_work *around; /* the lattice around, whose light is known; or NULL */
+    int number;                    /* of the lattice, from outside */
+    bool has_within;               /* whether another stands in it */
+    int count, axes[3];            /* ordinates: all, and by their major axes */
+    int across;                    /* tiles of theirs along z */
     struct buffer ordinates, dots;
     struct texture sources, means, hits; /* by ordinates */
+    struct texture world_means;          /* the same of the world's own light, for one within */
     struct texture slices[2];            /* what leaves a slice of cells */
+    bool warm;                           /* whether iterations begin with what was known */
     struct texture cuts, wall;           /* all links that surfaces cut; these surfaces' radiance */
     struct texture depths, missing[3];   /* for diffusion: of cells; the fluence, by steps */
     struct texture first, world, now, next; /* moments: of the first source, of the world's own
@@ -75,6 +77,12 @@ static brume_result make_cells(struct dom_work *work)
                            "surfaces' reflectances");
 }
 
+/* Whether the world sends light into the lattice. */
+static bool has_world(const struct dom_work *work)
+{
+    return work->cells.input->world_count > 0;
+}
+
 /* Tiles of ordinates fill a column along z, then the next along y. */
 static brume_result make_ordinates(struct dom_work *work)
 {
@@ -105,6 +113,9 @@ static brume_result make_ordinates(struct dom_work *work)
     TRY(lattice_texture(work, &work->means, GL_RGBA16F, 1, columns, work->across, "radiance"));
     TRY(lattice_texture(work, &work->hits, GL_RGBA16F, 1, columns, work->across,
                         "light on surfaces"));
+    if (work->has_within && has_world(work))
+        TRY(lattice_texture(work, &work->world_means, GL_RGBA16F, 1, columns, work->across,
+                            "the world's radiance"));
     int side = dims.x > dims.y ? dims.x : dims.y;
     side = side > dims.z ? side : dims.z;
     for (int i = 0; i < 2; ++i)
@@ -190,12 +201,6 @@ static brume_result over_field(struct dom_work *work, const char *stem, ivec4 of
     return BRUME_OK;
 }
 
-/* Whether the world sends light into the lattice. */
-static bool has_world(const struct dom_work *work)
-{
-    return work->cells.input->world_count > 0;
-}
-
 static brume_result prepare(struct dom_work *work)
 {
     struct lpv_work *cells = &work->cells;
@@ -228,7 +233,9 @@ static brume_result prepare(struct dom_work *work)
 
 /* --- Iterations ----------------------------------------------------------------------------- */
 
-/* Light along all ordinates through the whole lattice, slice by slice, into work->means. */
+/* Light along all ordinates through the whole lattice, slice by slice, into work->means. From
+ * beyond its sides comes the world's own light, or of the same kind what the lattice around has
+ * there. */
 static brume_result sweep(struct dom_work *work, bool world)
 {
     const struct program *program;
@@ -238,6 +245,10 @@ static brume_result sweep(struct dom_work *work, bool world)
     bind_lattice(work);
     glBindTextureUnit(SLOT_CELL_WALLS, work->wall.id);
     glBindTextureUnit(SLOT_ANGULAR, work->sources.id);
+    const struct dom_work *around = work->around;
+    if (around)
+        glBindTextureUnit(SLOT_MEANS_AROUND, world ? around->world_means.id : around->means.id);
+    glProgramUniform2i(program->id, 1, work->number - 1, around ? around->across : 1);
     image(SLOT_OUTPUT, &work->means);
     image(SLOT_OUTPUT + 2, &work->hits);
     const int most = longest_side(work);
@@ -404,6 +415,12 @@ static brume_result begin(struct dom_work *work)
         laps_go(work->cells.laps, BRUME_FIELD_SCATTERED);
         TRY(sweep(work, true));
         TRY(gather(work, &work->world, false));
+        if (work->has_within) {
+            const struct texture *means = &work->means;
+            glCopyImageSubData(means->id, GL_TEXTURE_3D, 0, 0, 0, 0, work->world_means.id,
+                               GL_TEXTURE_3D, 0, 0, 0, 0, means->width, means->height,
+                               means->depth);
+        }
     }
     laps_go(work->cells.laps, BRUME_FIELD_SCATTERED);
     bind_lattice(work);
@@ -432,6 +449,7 @@ static brume_result solve(struct dom_work *work)
     const int wanted = work->cells.input->settings->iterations;
     const int most = wanted > 0 ? wanted : MOST_ITERATIONS;
     laps_go(work->cells.laps, BRUME_FIELD_ITERATIONS);
+    const double limit = (double)work->cells.input->settings->converged;
     double least = INFINITY;
     for (int i = 0, best = 0; i < most; ++i) {
         double change = 0.0;
@@ -444,31 +462,41 @@ static brume_result solve(struct dom_work *work)
             least = change;
             best = i;
         }
-        /* In the first one surfaces only learn what they have to send. */
-        if (wanted <= 0 && i > 0 && (change < CONVERGED || i - best >= STALLED))
+        /* In the first one surfaces only learn what they have to send, unless they know. */
+        if (wanted <= 0 && (i > 0 || work->warm) && (change < limit || i - best >= STALLED))
             break;
     }
     return BRUME_OK;
 }
 
+/* Light of the last run, where it had some, to begin with. */
+static brume_result warm_up(struct dom_work *work, const struct transport *transport)
+{
+    for (int i = 0; i < transport->level_count; ++i) {
+        bind_lattice(work);
+        glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL_BEFORE, transport->levels[i].id);
+        glBindTextureUnit(SLOT_ANGULAR, transport->light.id);
+        glBindTextureUnit(SLOT_CELL_WALLS, transport->wall.id);
+        glBindTextureUnit(SLOT_MOMENTS, work->world.id);
+        image(SLOT_OUTPUT, &work->now);
+        image(SLOT_OUTPUT + 1, &work->wall);
+        TRY(over_field(work, "dom_warm", (ivec4){has_world(work), 0, 0, 0}));
+    }
+    work->warm = transport->level_count > 0;
+    return BRUME_OK;
+}
+
 static brume_result hand_over(struct dom_work *work, struct transport *transport)
 {
-    laps_go(work->cells.laps, BRUME_FIELD_COPY);
     bind_lattice(work);
     glBindTextureUnit(SLOT_MOMENTS, work->now.id);
     glBindTextureUnit(SLOT_MOMENTS + 1, work->world.id);
     glBindTextureUnit(SLOT_WALLS, work->cells.walls.id);
+    glBindTextureUnit(SLOT_CELL_WALLS, work->wall.id);
     image(SLOT_OUTPUT, &transport->field);
     image(SLOT_OUTPUT + 1, &transport->light);
+    image(SLOT_OUTPUT + 2, &transport->wall);
     return over_field(work, "dom_finish", (ivec4){has_world(work), 0, 0, 0});
-}
-
-static brume_result find(struct dom_work *work, struct transport *transport)
-{
-    TRY(prepare(work));
-    TRY(begin(work));
-    TRY(solve(work));
-    return hand_over(work, transport);
 }
 
 /* --- All of it ------------------------------------------------------------------------------ */
@@ -476,38 +504,73 @@ static brume_result find(struct dom_work *work, struct transport *transport)
 static brume_result make_product(struct transport *transport, const struct transport_input *input)
 {
     struct memory *memory = &input->gpu->memory;
-    const struct gpu_field *field = &input->frame->fields[0];
-    const ivec4 dims = field->dims;
-    TRY(texture_ensure(memory, &transport->field, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA32F,
-                       texture_side(4 * dims.x), texture_side(dims.y), texture_side(dims.z), 1,
-                       "field"));
+    const struct gpu_frame *frame = input->frame;
+    int x = 0, y = 0, z = 0;
+    for (int i = 0; i < frame->field.x; ++i) {
+        const ivec4 dims = frame->fields[i].dims;
+        x = dims.x > x ? dims.x : x;
+        y = dims.y > y ? dims.y : y;
+        z = dims.w + dims.z;
+    }
+    TRY(lpv_make_product(&transport->field, input));
     TRY(texture_ensure(memory, &transport->light, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
-                       texture_side(MOMENT_SIDE * dims.x), texture_side(MOMENT_SIDE * dims.y),
-                       texture_side(dims.z), 1, "moments"));
+                       texture_side(MOMENT_SIDE * x), texture_side(MOMENT_SIDE * y),
+                       texture_side(z), 1, "moments"));
     TRY(texture_ensure(memory, &transport->scattered, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
-                       texture_side(dims.x), texture_side(dims.y), texture_side(dims.z), 1,
+                       texture_side(x), texture_side(y), texture_side(z), 1,
                        "scattered towards the eye"));
-    return buffer_update(memory, &transport->level, FOR_TRANSPORT, sizeof *field, field, "lattice");
+    TRY(texture_ensure(memory, &transport->wall, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
+                       texture_side(x), texture_side(y), texture_side(z), 1, "surfaces' radiance"));
+    for (int i = 0; i < frame->field.x; ++i)
+        TRY(buffer_update(memory, &transport->levels[i], FOR_TRANSPORT, sizeof frame->fields[i],
+                          &frame->fields[i], "lattice"));
+    return BRUME_OK;
+}
+
+/* From the outermost lattice to the innermost. What was known before stays until all is found: a
+ * run that is cancelled loses nothing. */
+static brume_result find(struct dom_work *works, int levels, struct transport *transport)
+{
+    for (int i = 0; i < levels; ++i) {
+        TRY(prepare(&works[i]));
+        TRY(begin(&works[i]));
+        if (works->cells.input->settings->warm)
+            TRY(warm_up(&works[i], transport));
+        TRY(solve(&works[i]));
+    }
+    transport->eye = 0;
+    transport->level_count = 0;
+    laps_go(works->cells.laps, BRUME_FIELD_COPY);
+    TRY(make_product(transport, works->cells.input));
+    for (int i = 0; i < levels; ++i)
+        TRY(hand_over(&works[i], transport));
+    transport->level_count = levels;
+    return BRUME_OK;
 }
 
 brume_result dom_run(struct transport *transport, const struct transport_input *input)
 {
     TRY(opv_run(transport, input));
-    if (!input->frame->field.x)
+    const int levels = input->frame->field.x;
+    if (!levels)
         return BRUME_OK;
-    transport->eye = 0;
-    TRY(make_product(transport, input));
     transport_bind(transport); /* depths, as OPV has just found them */
     struct laps laps = {.sums_ms = input->stats->field_ms};
-    struct dom_work work = {
-        .cells = {.input = input,
-                  .field = &input->frame->fields[0],
-                  .laps = &laps,
-                  .passes = {.input = input, .done = 1.0f}},
-        .count = input->settings->ordinates,
-    };
-    const brume_result result = find(&work, transport);
-    finish(&work);
+    struct dom_work works[FIELD_LEVELS] = {0};
+    for (int i = 0; i < levels; ++i)
+        works[i] = (struct dom_work){
+            .cells = {.input = input,
+                      .field = &input->frame->fields[i],
+                      .laps = &laps,
+                      .passes = {.input = input, .done = 1.0f}},
+            .around = i ? &works[i - 1] : NULL,
+            .number = i,
+            .has_within = i + 1 < levels,
+            .count = input->settings->ordinates,
+        };
+    const brume_result result = find(works, levels, transport);
+    for (int i = 0; i < levels; ++i)
+        finish(&works[i]);
     laps_end(&laps);
     return result;
 }
@@ -526,15 +589,17 @@ static uint64_t eye_signature(const struct gpu_frame *frame)
 brume_result dom_look(struct gpu *gpu, struct transport *transport, const struct gpu_frame *frame)
 {
     const struct program *program;
-    const ivec4 dims = frame->fields[0].dims;
     const uint64_t eye = eye_signature(frame);
     if (transport->eye == eye)
         return BRUME_OK;
     TRY(program_compute(&gpu->programs, "dom_eye", &program));
-    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL, transport->level.id);
     glBindTextureUnit(SLOT_MOMENTS, transport->light.id);
     image(SLOT_OUTPUT, &transport->scattered);
-    program_dispatch(program, dims.x, dims.y, dims.z);
+    for (int i = 0; i < frame->field.x; ++i) {
+        const ivec4 dims = frame->fields[i].dims;
+        glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL, transport->levels[i].id);
+        program_dispatch(program, dims.x, dims.y, dims.z);
+    }
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     transport->eye = eye;
     return BRUME_OK;

@@ -309,8 +309,7 @@ static brume_result find(struct lpv_work *works, int levels)
     return BRUME_OK;
 }
 
-/* The texture of all lattices, one above the other. */
-static brume_result make_product(struct texture *product, const struct transport_input *input)
+brume_result lpv_make_product(struct texture *product, const struct transport_input *input)
 {
     const struct gpu_frame *frame = input->frame;
     int size[3] = {0};
@@ -331,7 +330,7 @@ brume_result lpv_run(struct transport *transport, const struct transport_input *
     const int levels = input->frame->field.x;
     if (!levels)
         return BRUME_OK;
-    TRY(make_product(&transport->field, input));
+    TRY(lpv_make_product(&transport->field, input));
     transport_bind(transport); /* depths and sky, as OPV has just found them */
     struct laps laps = {.sums_ms = input->stats->field_ms};
     struct lpv_work works[FIELD_LEVELS] = {0};

@@ -53,6 +53,9 @@ int lpv_tile_rows(const ivec4 *dims, int in_a_row);
 brume_result lpv_strew(struct lpv_work *work, const char *stem, GLuint target, const ivec4 *dims,
                        int in_a_row, int texels);
 
+/* The texture of all lattices' fields, one above the other. */
+brume_result lpv_make_product(struct texture *product, const struct transport_input *input);
+
 /* Links that surfaces cut, and what these reflect, into work->links and walls. */
 brume_result lpv_cut_links(struct lpv_work *work);
 /* What surfaces reflect of the lights' own light, into work->reflected; and where blockers are

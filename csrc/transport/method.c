@@ -26,11 +26,23 @@ void transport_bind(const struct transport *transport)
     glBindTextureUnit(SLOT_SCATTERED, transport->scattered.id);
 }
 
+uint64_t transport_field_bytes(const struct transport *transport)
+{
+    uint64_t bytes = transport->field.bytes + transport->light.bytes + transport->scattered.bytes +
+                     transport->wall.bytes;
+    for (int i = 0; i < FIELD_LEVELS; ++i)
+        bytes += transport->levels[i].bytes;
+    return bytes;
+}
+
 void transport_forget_moments(struct gpu *gpu, struct transport *transport)
 {
     texture_finish(&gpu->memory, &transport->light);
     texture_finish(&gpu->memory, &transport->scattered);
-    buffer_finish(&gpu->memory, &transport->level);
+    texture_finish(&gpu->memory, &transport->wall);
+    for (int i = 0; i < FIELD_LEVELS; ++i)
+        buffer_finish(&gpu->memory, &transport->levels[i]);
+    transport->level_count = 0;
 }
 
 void transport_forget_field(struct gpu *gpu, struct transport *transport)

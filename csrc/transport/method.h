@@ -16,9 +16,12 @@ struct transport {
     struct texture tau;    /* optical depth to each light over the length of the way, a tile a light */
     struct texture sky[3]; /* the world's light, spherical harmonics a colour */
     struct texture field;  /* light scattered or reflected before, as lpv_finish leaves it */
-    struct texture light, scattered; /* DOM: its moments, and what cells scatter of it to the eye */
-    struct buffer level;   /* and the lattice that they are of */
-    uint64_t eye;          /* of the eye that it was last found for, 0: none */
+    /* DOM: moments of the light that media scatter, what cells scatter of it to the eye, and what
+     * surfaces in cells send out; of so many lattices, one above the other. */
+    struct texture light, scattered, wall;
+    struct buffer levels[FIELD_LEVELS];
+    int level_count;
+    uint64_t eye;          /* of the eye that `scattered` was last found for, 0: none */
     /* Signatures of what a light's tile and the sky hold, 0: nothing of use. */
     uint64_t *tau_signatures, sky_signature;
     uint32_t tau_count;
@@ -49,7 +52,9 @@ struct method {
 /* NULL for an unknown number. */
 const struct method *method_find(uint32_t number);
 void transport_bind(const struct transport *transport);
-/* What is known of light scattered or reflected. */
+/* Bytes of what is known of light scattered or reflected. */
+uint64_t transport_field_bytes(const struct transport *transport);
+/* Forgets that. */
 void transport_forget_field(struct gpu *gpu, struct transport *transport);
 /* Of this what DOM alone makes. */
 void transport_forget_moments(struct gpu *gpu, struct transport *transport);

@@ -164,14 +164,12 @@ vec3 field_scatter(vec3 p, vec3 out_direction, float g)
     return max(light.fluence + 3.0 * g * (out_direction * light.flux), vec3(0.0)) / (4.0 * PI);
 }
 
-// The same as DOM's cells scatter it, per unit of sigma_s. Where no surface is near the texture's own
-// interpolation does.
-vec3 field_scattered(vec3 p)
+// The same as the cells of one of DOM's lattices scatter it, per unit of sigma_s. Where no surface is near
+// the texture's own interpolation does.
+vec3 scattered_in(gpu_field field, vec3 p)
 {
-    if (!field_reaches(p))
-        return vec3(0.0);
-    gpu_field field = frame.fields[0];
     vec3 at = clamp((p - field.lower.xyz) / field.lower.w, vec3(0.5), vec3(field.dims.xyz) - 0.5);
+    at.z += float(field.dims.w);
     vec4 light = textureLod(scattered_lattice, at / vec3(textureSize(scattered_lattice, 0)), 0.0);
     vec4 sum = vec4(0.0);
     // A loop rather than a branch: software runs through both sides of every branch.
@@ -180,10 +178,26 @@ vec3 field_scattered(vec3 p)
         for (int corner = 0; corner < 8; ++corner) {
             ivec3 cell;
             float weight = share_of_cell(cells, field, corner, vec4(0.0, 0.0, 0.0, -1.0), cell);
-            sum += weight * vec4(texelFetch(scattered_lattice, cell, 0).rgb, 1.0);
+            sum += weight * vec4(texelFetch(scattered_lattice, texel_of(field, cell, 0), 0).rgb, 1.0);
         }
     }
     return sum.w > 1e-3 ? sum.rgb / sum.w : light.rgb;
+}
+
+vec3 field_scattered(vec3 p)
+{
+    if (!field_reaches(p))
+        return vec3(0.0);
+    vec3 light = vec3(0.0);
+    float left = 1.0;
+    for (int number = frame.field.x - 1; number >= 0 && left > 0.0; --number) {
+        float share = number > 0 ? left * share_of(frame.fields[number], p) : left;
+        if (share <= 0.0)
+            continue;
+        light += share * scattered_in(frame.fields[number], p);
+        left -= share;
+    }
+    return light;
 }
 
 vec3 field_irradiance(field_light light, vec3 normal)

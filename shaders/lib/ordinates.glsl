@@ -22,6 +22,12 @@ ivec3 moment_texel(ivec3 cell, int moment)
     return cell + ivec3(moment % MOMENT_SIDE, moment / MOMENT_SIDE, 0) * ivec3(level.dims.xy, 0);
 }
 
+// A texel of one lattice where all stand one above the other.
+ivec3 above(ivec3 texel)
+{
+    return texel + ivec3(0, 0, level.dims.w);
+}
+
 // The same of what is extrapolated: bands 0 and 1, and the radiance of surfaces.
 ivec3 mixed_texel(ivec3 cell, int number)
 {

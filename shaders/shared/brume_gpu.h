@@ -31,6 +31,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_STAGE 1
 #define SLOT_LEVEL 2
 #define SLOT_ORDINATES 3     /* and as a storage buffer where they are written */
+#define SLOT_LEVEL_BEFORE 4  /* DOM: a lattice of the last run */
 
 /* Storage buffers */
 #define SLOT_LIGHTS 0
@@ -87,6 +88,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_MOMENTS 34      /* and one more that a stage's shader names */
 #define SLOT_CELL_WALLS 31   /* radiance of the surfaces in a cell */
 #define SLOT_HISTORY 24      /* and three more: residuals, or results */
+#define SLOT_MEANS_AROUND 27 /* what cells' means are in the lattice around */
 #define SLOT_CELL_DEPTHS 24  /* optical depths of cells as diffusion has them */
 #define SLOT_MISSING 25      /* and one more: what an iteration has yet to find, and a step before */
 

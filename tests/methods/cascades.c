@@ -6,9 +6,12 @@
 #define CELLS 16
 #define RINGS 6 /* of the inner lattice's cells, from its sides inwards */
 
-static brume_settings settings_for(int cells, int cascades)
+static const uint32_t methods[] = {BRUME_METHOD_LPV, BRUME_METHOD_DOM};
+static const char *const names[] = {"LPV", "DOM"};
+
+static brume_settings settings_for(uint32_t method, int cells, int cascades)
 {
-    return (brume_settings){.method = BRUME_METHOD_LPV,
+    return (brume_settings){.method = method,
                             .medium_resolution = 32,
                             .lattice_resolution = 32,
                             .field_resolution = cells,
@@ -36,7 +39,7 @@ struct ring {
 };
 
 /* In a closed box with fog and a lamp. */
-static void compare(float sigma_s, float reflectance, const float lamp[3], bool with_fine,
+static void compare(uint32_t method, float sigma_s, float reflectance, const float lamp[3], bool with_fine,
                     struct ring rings[RINGS])
 {
     const struct coefficients fog = {.sigma_s = {sigma_s, sigma_s, sigma_s},
@@ -45,11 +48,11 @@ static void compare(float sigma_s, float reflectance, const float lamp[3], bool 
     add_box(scene, 1, 1.0f, reflectance);
     add_fog_cube(scene, 2, origin, 1.0f, &fog);
     add_lamp(scene, 3, lamp, 1.0f);
-    brume_settings settings = settings_for(CELLS, 1);
+    brume_settings settings = settings_for(method, CELLS, 1);
     struct field coarse = field_of(scene, &settings, NULL);
-    settings = settings_for(CELLS, 2);
+    settings = settings_for(method, CELLS, 2);
     struct field within = field_of(scene, &settings, NULL);
-    settings = settings_for(2 * CELLS, 1);
+    settings = settings_for(method, 2 * CELLS, 1);
     struct field fine = with_fine ? field_of(scene, &settings, NULL) : coarse;
     within.level = 1;
     const int *dims = dims_of(&within);
@@ -87,12 +90,14 @@ static void as_bright_as_around(void **state)
     static const struct {
         float sigma_s, reflectance;
     } cases[] = {{0.5f, 0.3f}, {0.5f, 0.8f}, {4.0f, 0.3f}};
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    const size_t count = sizeof cases / sizeof *cases;
+    for (size_t k = 0; k < 2 * count; ++k) {
+        const size_t i = k % count;
         struct ring rings[RINGS] = {0};
-        compare(cases[i].sigma_s, cases[i].reflectance, (float[3]){0.8f, 0.2f, -0.3f}, false,
-                rings);
+        compare(methods[k / count], cases[i].sigma_s, cases[i].reflectance,
+                (float[3]){0.8f, 0.2f, -0.3f}, false, rings);
         for (int r = 0; r < RINGS; ++r) {
-            print_message("sigma_s %g, reflectance %g, ring %d: %.2f %%\n",
+            print_message("%s, sigma_s %g, reflectance %g, ring %d: %.2f %%\n", names[k / count],
                           (double)cases[i].sigma_s, (double)cases[i].reflectance, r,
                           100.0 * (rings[r].within / rings[r].coarse - 1.0));
             assert_close(rings[r].within, rings[r].coarse, 0.03);
@@ -104,17 +109,19 @@ static void as_bright_as_around(void **state)
 static void finer_within(void **state)
 {
     (void)state;
-    struct ring rings[RINGS] = {0};
-    compare(0.5f, 0.3f, (float[3]){0.1f, 0.2f, -0.1f}, true, rings);
-    double within = 0.0, coarse = 0.0, all = 0.0;
-    for (int r = 3; r < RINGS; ++r) {
-        within += rings[r].within_off;
-        coarse += rings[r].coarse_off;
-        all += rings[r].fine;
+    for (size_t k = 0; k < 2; ++k) {
+        struct ring rings[RINGS] = {0};
+        compare(methods[k], 0.5f, 0.3f, (float[3]){0.1f, 0.2f, -0.1f}, true, rings);
+        double within = 0.0, coarse = 0.0, all = 0.0;
+        for (int r = 3; r < RINGS; ++r) {
+            within += rings[r].within_off;
+            coarse += rings[r].coarse_off;
+            all += rings[r].fine;
+        }
+        print_message("%s, off finer cells: within %.2f %%, around %.2f %%\n", names[k],
+                      100.0 * within / all, 100.0 * coarse / all);
+        assert_true(within < 0.5 * coarse);
     }
-    print_message("off finer cells: within %.2f %%, around %.2f %%\n", 100.0 * within / all,
-                  100.0 * coarse / all);
-    assert_true(within < 0.5 * coarse);
 }
 
 /* --- The focus -------------------------------------------------------------------------------- */
@@ -140,7 +147,7 @@ static void around_the_camera(void **state)
     add_box(scene, 1, 1.0f, 0.5f);
     add_fog_cube(scene, 2, (float[3]){0.4f, 0, 0}, 0.5f, &white_fog);
     add_lamp(scene, 3, (float[3]){0.5f, 0.2f, -0.3f}, 1.0f);
-    brume_settings settings = settings_for(CELLS, 2);
+    brume_settings settings = settings_for(BRUME_METHOD_LPV, CELLS, 2);
     struct field there, here;
     /* The medium's middle, wherever the camera is. */
     const uint64_t first = transports(scene, &settings, (float[3]){-0.6f, 0, 0}, &there);
@@ -171,7 +178,7 @@ static void odd_lattices(void **state)
     add_lamp(scene, 3, (float[3]){0.5f, 0.2f, -0.3f}, 1.0f);
     for (size_t i = 0; i < sizeof cells / sizeof *cells; ++i)
         for (uint32_t blockers = 0; blockers < BRUME_BLOCKERS_COUNT; ++blockers) {
-            brume_settings settings = settings_for(cells[i], 3);
+            brume_settings settings = settings_for(BRUME_METHOD_LPV, cells[i], 3);
             settings.blockers = blockers;
             settings.iterations = 5;
             struct field field = field_of(scene, &settings, NULL);
@@ -179,11 +186,11 @@ static void odd_lattices(void **state)
                 assert_sound(&field);
             free(field.texels);
         }
-    brume_settings settings = settings_for(8, 4);
+    brume_settings settings = settings_for(BRUME_METHOD_LPV, 8, 4);
     const brume_view view = orthographic_view(origin, (float[3]){0, 0, -1}, 0.1f, 5.0f, 4);
     brume_job *job = NULL;
     assert_int_equal(brume_render(scene, &settings, &view, &job), BRUME_E_ARGUMENT);
-    settings = settings_for(8, 1);
+    settings = settings_for(BRUME_METHOD_LPV, 8, 1);
     settings.cascade_focus = 7;
     assert_int_equal(brume_render(scene, &settings, &view, &job), BRUME_E_ARGUMENT);
     brume_scene_destroy(scene);

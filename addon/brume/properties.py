@@ -7,14 +7,14 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 from . import native
 
 METHODS = [
-    ('OPV', "Single Scattering",
-     "Light that volumes scatter once: fast, and too dark in thick clouds", 0),
-    ('LPV', "Light Propagation",
-     "Light that volumes scatter and surfaces reflect goes on from cell to cell, as often as it "
-     "takes: fills rooms and clouds with light, softly", 1),
     ('DOM', "Discrete Ordinates",
      "Light goes along many directions, from cell to cell, until it has found its way: right to a "
      "few percent, and the more so the more cells and directions there are", 2),
+    ('LPV', "Light Propagation",
+     "Light that volumes scatter and surfaces reflect goes on from cell to cell, as often as it "
+     "takes: fills rooms and clouds with light, softly", 1),
+    ('OPV', "Single Scattering",
+     "Light that volumes scatter once: the quickest, and too dark in thick clouds and rooms", 0),
 ]
 
 PRESETS = {
@@ -44,7 +44,7 @@ def changed(settings, context):
 class BrumeSettings(bpy.types.PropertyGroup):
     method: EnumProperty(
         name="Method", update=changed,
-        items=METHODS, default='OPV',
+        items=METHODS, default='DOM',
         description="How light travels through volumes")
     preset: EnumProperty(
         name="Preset", default='PREVIEW', update=_apply_preset,

@@ -70,12 +70,12 @@ static const char help[] =
     "                              time or less, and fine detail of the medium is softer\n"
     "      --depths WAY            optical depths to the lamps: propagated (the default), marched\n"
     "                              (exact, slower); corrected or paper, to compare\n"
-    "      --method METHOD         opv: light that media scatter once (the default); lpv: and what\n"
-    "                              they and surfaces go on to scatter, softly; dom: the same, right\n"
-    "                              to a few percent\n"
+    "      --method METHOD         dom: all that media and surfaces scatter, right to a few percent\n"
+    "                              (the default); lpv: the same, softly; opv: light that media\n"
+    "                              scatter once, the quickest\n"
     "      --field-resolution N    lpv, dom: cells along the longest side of the lattice in which\n"
     "                              that goes on (default: half of --lattice-resolution)\n"
-    "      --cascades N            lpv: such lattices, each within the last around the medium, half\n"
+    "      --cascades N            lpv, dom: such lattices, each within the last around the medium, half\n"
     "                              as long with as many cells (1 to 3, default: 1)\n"
     "      --ordinates N           dom: directions that light goes along, 26, 48 or 96 (default: 48)\n"
     "      --iterations N          lpv: how many cells far; dom: how often it is scattered anew\n"
@@ -569,6 +569,7 @@ bool options_parse(int argc, char **argv, options *out, int *exit_code)
         .albedo = {0.9f, 0.9f, 0.9f},
         .kelvin = 1000.0f,
         .blackbody = 1.0f,
+        .settings = {.method = BRUME_METHOD_DOM},
         .background = {NAN},
         .floor = {NAN},
         .eye = {NAN},

@@ -95,6 +95,7 @@ def test_light_propagation(scene, render, monkeypatch):
         asked.append((settings.method, settings.light_paths, settings.blockers,
                       settings.field_resolution, settings.cascades, settings.cascade_focus)),
         native_render(self, settings, view))[1])
+    scene.brume.method = 'OPV'
     single = render()[..., :3].sum()
     scene.brume.method = 'LPV'
     found = {}
@@ -113,11 +114,14 @@ def test_light_propagation(scene, render, monkeypatch):
 
 
 def test_panels_are_those_of_the_method(scene):
-    panels = [bpy.types.BRUME_PT_light_propagation, bpy.types.BRUME_PT_light_propagation_comparison]
+    propagation = [bpy.types.BRUME_PT_light_propagation,
+                   bpy.types.BRUME_PT_light_propagation_comparison]
+    ordinates = [bpy.types.BRUME_PT_discrete_ordinates]
     scene.render.engine = 'BRUME'
-    for method, shown in (('OPV', False), ('LPV', True)):
+    for method, shown in (('OPV', []), ('LPV', propagation), ('DOM', ordinates)):
         scene.brume.method = method
-        assert [panel.poll(bpy.context) for panel in panels] == [shown, shown]
+        for panel in propagation + ordinates:
+            assert panel.poll(bpy.context) == (panel in shown)
 
 
 def test_zero_scale_leaves_the_rest(scene, render, reported):
@@ -386,4 +390,4 @@ def test_add_on_goes_and_comes(scene):
     addon_utils.disable("brume")
     assert not hasattr(bpy.types.Scene, "brume")
     addon_utils.enable("brume", persistent=True)
-    assert bpy.context.scene.brume.method == 'OPV'
+    assert bpy.context.scene.brume.method == 'DOM'

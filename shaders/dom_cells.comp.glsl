@@ -4,7 +4,7 @@
 // forward scattering counts as none, as everywhere with DOM: extinction comes scaled.
 #version 450 core
 #include "lib/medium.glsl"
-#include "lib/level.glsl"
+#include "lib/walls.glsl"
 #include "lib/harmonics.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
@@ -14,7 +14,6 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
     gpu_lattice_pass stage;
 };
 
-layout(binding = SLOT_WALLS) uniform usampler3D wall_sums;
 layout(binding = SLOT_LINKS) uniform usampler3D links;
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D cell_image[3]; // extinction; albedo,
@@ -22,6 +21,10 @@ layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D cell_image[3]; 
 layout(binding = SLOT_OUTPUT_FIELD, r32ui) writeonly uniform uimage3D cuts_image;
 layout(binding = SLOT_OUTPUT_FIELD + 1, rgba16f) writeonly uniform image3D depths_image; // of cells, by
                                              // what turns light off its way; not below THINNEST
+
+layout(binding = SLOT_OUTPUT_FIELD + 2, rgba16f) writeonly uniform image3D emission_image; // of surfaces
+
+layout(location = 0) uniform float brightest; // emission of a surface
 
 const int POINTS = 128; // along the lattice
 
@@ -62,11 +65,6 @@ void main()
         g_sum += part * g * luminance(frame.fog_sigma_s.rgb);
         g_weight += part * luminance(frame.fog_sigma_s.rgb);
     }
-    ivec3 texel = ivec3(WALL_TEXELS * cell.x, cell.yz);
-    vec4 walls = vec4(texelFetch(wall_sums, texel, 0).r,
-                      texelFetch(wall_sums, texel + ivec3(1, 0, 0), 0).r,
-                      texelFetch(wall_sums, texel + ivec3(2, 0, 0), 0).r,
-                      texelFetch(wall_sums, texel + ivec3(3, 0, 0), 0).r);
     uint cuts = texelFetch(links, links_texel(cell), 0).r;
     for (int i = 0; i < 13; ++i)
         cuts |= (texelFetch(links, links_texel(cell - LINKS[i]), 0).r >> i & 1u) << (13 + i);
@@ -77,6 +75,8 @@ void main()
     imageStore(cell_image[1], cell, vec4(albedo, g));
     vec3 turns = extinct * (1.0 - albedo * scaled_bands(g).y) * side;
     imageStore(depths_image, cell, vec4(clamp(turns, vec3(THINNEST), vec3(65504.0)), 0.0));
-    imageStore(cell_image[2], cell, vec4(walls.rgb / (255.0 * max(walls.a, 1.0)), 0.0));
+    imageStore(cell_image[2], cell, vec4(mean_of_walls(cell, 0), 0.0));
+    vec3 emission = mean_of_walls(cell, WALL_EMISSION) * brightest;
+    imageStore(emission_image, cell, vec4(min(emission, vec3(65504.0)), 0.0));
     imageStore(cuts_image, cell, uvec4(cuts, 0u, 0u, 0u));
 }

@@ -41,7 +41,7 @@ void main()
     imageStore(wall_image, above(cell), texelFetch(cell_walls, cell, 0));
     uint cuts = texelFetch(cell_cuts, cell, 0).r, where = 0u;
     for (int axis = 0; axis < 3; ++axis)
-        where |= texelFetch(walls, ivec3(WALL_TEXELS * cell.x + 4 + axis, cell.yz), 0).r
+        where |= texelFetch(walls, ivec3(WALL_TEXELS * cell.x + WALL_CUTS + axis, cell.yz), 0).r
                  << (8 * axis);
     const float fluence = 3.5449077018110318, flux = 2.0466534158929770; // sqrt(4 pi), sqrt(4 pi / 3)
     ivec3 texel = above(cell);

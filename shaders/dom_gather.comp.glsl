@@ -19,6 +19,7 @@ layout(binding = SLOT_ANGULAR) uniform sampler3D means;
 layout(binding = SLOT_HITS) uniform sampler3D hits;
 layout(binding = SLOT_MOMENTS) uniform sampler3D moments; // that the iteration began with
 layout(binding = SLOT_CELL_WALLS) uniform sampler3D cell_walls; // radiance that it began with
+layout(binding = SLOT_CELL_EMISSION) uniform sampler3D cell_emission; // radiance
 layout(binding = SLOT_REFLECTED) uniform sampler2D reflected[3];
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D moments_image;
@@ -26,7 +27,7 @@ layout(binding = SLOT_OUTPUT + 1, rgba16f) writeonly uniform image3D residual_im
 layout(binding = SLOT_OUTPUT + 2, rgba16f) writeonly uniform image3D result_image;
 
 // The radiance of a cell's surfaces: they send out, over the links that they cut, what meets them there,
-// by their reflectance, and what they reflect of the lights' own light.
+// by their reflectance, what they reflect of the lights' own light, and what they emit.
 vec3 wall_radiance(ivec3 cell)
 {
     vec3 meets = vec3(0.0);
@@ -43,8 +44,9 @@ vec3 wall_radiance(ivec3 cell)
     ivec2 texel = tiled_texel(cell, level.dims.xyz, stage.offset.y);
     vec3 first = vec3(texelFetch(reflected[0], texel, 0).x, texelFetch(reflected[1], texel, 0).x,
                       texelFetch(reflected[2], texel, 0).x);
-    return (texelFetch(cell_reflectance, cell, 0).rgb * meets +
-            first / (level.lower.w * level.lower.w)) / area;
+    vec3 emitted = texelFetch(cell_emission, cell, 0).rgb;
+    return emitted + (texelFetch(cell_reflectance, cell, 0).rgb * meets +
+                      first / (level.lower.w * level.lower.w)) / area;
 }
 
 void keep(ivec3 texel, vec3 result, vec3 before)

@@ -13,17 +13,22 @@ flat in uint instance_number;
 layout(binding = SLOT_OUTPUT_LINKS, r32ui) uniform uimage3D links_image;
 layout(binding = SLOT_OUTPUT_WALLS, r32ui) uniform uimage3D walls_image;
 
-// Diffuse reflectance in 1/255, and a count.
-void add_wall(ivec3 cell, vec3 reflectance)
+void add(ivec3 texel, vec3 value)
+{
+    uvec3 parts = uvec3(clamp(value, 0.0, 1.0) * WALL_UNIT + 0.5);
+    for (int c = 0; c < 3; ++c)
+        imageAtomicAdd(walls_image, texel + ivec3(c, 0, 0), parts[c]);
+}
+
+void add_wall(ivec3 cell, vec3 reflectance, vec3 emission)
 {
     if (!in_level(cell))
         return;
     ivec3 texel = ivec3(WALL_TEXELS * cell.x, cell.yz);
-    uvec3 parts = uvec3(clamp(reflectance, 0.0, 1.0) * 255.0 + 0.5);
-    imageAtomicAdd(walls_image, texel, parts.r);
-    imageAtomicAdd(walls_image, texel + ivec3(1, 0, 0), parts.g);
-    imageAtomicAdd(walls_image, texel + ivec3(2, 0, 0), parts.b);
-    imageAtomicAdd(walls_image, texel + ivec3(3, 0, 0), 1u);
+    add(texel, reflectance);
+    if (emission != vec3(0.0))
+        add(texel + ivec3(WALL_EMISSION, 0, 0), emission);
+    imageAtomicAdd(walls_image, texel + ivec3(WALL_COUNT, 0, 0), 1u);
 }
 
 void main()
@@ -41,9 +46,10 @@ void main()
     if (in_links(cell))
         imageAtomicOr(links_image, links_texel(cell), 1u << stage.info.y);
     if (stage.info.y < 3u && in_level(cell))
-        imageAtomicMax(walls_image, ivec3(WALL_TEXELS * cell.x + 4 + axis, cell.yz),
+        imageAtomicMax(walls_image, ivec3(WALL_TEXELS * cell.x + WALL_CUTS + axis, cell.yz),
                        uint((at[axis] - along) * 253.0) + 1u);
     vec3 reflectance = material.diffuse.rgb * base.rgb;
-    add_wall(cell, reflectance);
-    add_wall(cell + link, reflectance);
+    vec3 emission = material.emission.rgb * stage.clip.w;
+    add_wall(cell, reflectance, emission);
+    add_wall(cell + link, reflectance, emission);
 }

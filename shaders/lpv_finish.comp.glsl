@@ -24,7 +24,7 @@ void main()
         backwards |= texelFetch(links, links_texel(cell - LINKS[i]), 0).r & 1u << i;
     uint where = 0u;
     for (int axis = 0; axis < 3; ++axis)
-        where |= texelFetch(walls, ivec3(WALL_TEXELS * cell.x + 4 + axis, cell.yz), 0).r
+        where |= texelFetch(walls, ivec3(WALL_TEXELS * cell.x + WALL_CUTS + axis, cell.yz), 0).r
                  << (8 * axis);
     ivec3 texel = cell + ivec3(0, 0, level.dims.w);
     for (int c = 0; c < 3; ++c, texel.x += level.dims.x)

@@ -3,7 +3,7 @@
 // mean reflectance of the surfaces that cut its links.
 #version 450 core
 #include "lib/medium.glsl"
-#include "lib/level.glsl"
+#include "lib/walls.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
@@ -12,7 +12,6 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
     gpu_lattice_pass stage; // offset.x: 0 leaves the media out
 };
 
-layout(binding = SLOT_WALLS) uniform usampler3D wall_sums;
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D cell_image[3]; // extinction,
                                                                  // albedo, surfaces' reflectance
@@ -51,13 +50,8 @@ void main()
         extinct += part * (frame.fog_sigma_t.rgb - g * frame.fog_sigma_s.rgb);
         scatter += part * (1.0 - g) * frame.fog_sigma_s.rgb;
     }
-    ivec3 texel = ivec3(WALL_TEXELS * cell.x, cell.yz);
-    vec4 walls = vec4(texelFetch(wall_sums, texel, 0).r,
-                      texelFetch(wall_sums, texel + ivec3(1, 0, 0), 0).r,
-                      texelFetch(wall_sums, texel + ivec3(2, 0, 0), 0).r,
-                      texelFetch(wall_sums, texel + ivec3(3, 0, 0), 0).r);
     extinct = clamp(extinct, vec3(0.0), vec3(65504.0));
     imageStore(cell_image[0], cell, vec4(extinct, 0.0));
     imageStore(cell_image[1], cell, vec4(clamp(scatter / max(extinct, vec3(1e-12)), 0.0, 1.0), 0.0));
-    imageStore(cell_image[2], cell, vec4(walls.rgb / (255.0 * max(walls.a, 1.0)), 0.0));
+    imageStore(cell_image[2], cell, vec4(mean_of_walls(cell, 0), 0.0));
 }

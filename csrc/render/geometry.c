@@ -196,6 +196,11 @@ static brume_result sync_materials(struct gpu *gpu, struct geometry *geometry,
     for (uint32_t i = 0; i < table->count; ++i)
         materials[i + 1] = material_to_gpu(
             geometry, &((const struct material_block *)table->entries[i].block)->material);
+    geometry->brightest = 0.0f;
+    for (size_t i = 0; i < count; ++i) {
+        const vec4 e = materials[i].emission;
+        geometry->brightest = fmaxf(geometry->brightest, fmaxf(e.x, fmaxf(e.y, e.z)));
+    }
     const brume_result result =
         buffer_update(&gpu->memory, &geometry->materials, FOR_MESH, count * sizeof *materials,
                       materials, "materials");

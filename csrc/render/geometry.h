@@ -41,6 +41,7 @@ struct geometry {
     struct buffer instances, instance_numbers, materials, stage_block;
     GLuint vertex_array;
     uint32_t triangle_count;      /* instances counted */
+    float brightest;              /* the greatest emission of a material, W/(sr m^2) */
     float lower[3], upper[3];     /* of everything drawn; lower > upper when empty */
     /* Of all but flat meshes: what a ground plane, however wide, leaves for sharp shadows. */
     float solid_lower[3], solid_upper[3];

@@ -29,6 +29,7 @@ struct dom_work {
     struct texture slices[2];            /* what leaves a slice of cells */
     bool warm;                           /* whether iterations begin with what was known */
     struct texture cuts, wall;           /* all links that surfaces cut; these surfaces' radiance */
+    struct texture emission;             /* of surfaces */
     struct texture depths, missing[3];   /* for diffusion: of cells; the fluence, by steps */
     struct texture first, world, now, next; /* moments: of the first source, of the world's own
                                                light, of what an iteration begins with, and finds */
@@ -73,6 +74,7 @@ static brume_result make_cells(struct dom_work *work)
                      1, "cut links"));
     TRY(lattice_texture(work, &work->cuts, GL_R32UI, 1, 1, 1, "cells' cut links"));
     TRY(lattice_texture(work, &work->wall, GL_RGBA16F, 1, 1, 1, "surfaces' radiance"));
+    TRY(lattice_texture(work, &work->emission, GL_RGBA16F, 1, 1, 1, "surfaces' emission"));
     return lattice_texture(work, &cells->walls, GL_R32UI, WALL_TEXELS, 1, 1,
                            "surfaces' reflectances");
 }
@@ -90,8 +92,8 @@ static brume_result make_ordinates(struct dom_work *work)
     const ivec4 dims = work->cells.field->dims;
     const int limit = gpu->context.info.max_texture_3d;
     const int most = (limit - 1) / dims.z;
-    work->across = work->count < most ? work->count : most;
-    const int columns = (work->count + work->across - 1) / work->across;
+    const int columns = (work->count + most - 1) / most;
+    work->across = (work->count + columns - 1) / columns;
     if (columns * dims.y >= limit)
         return fail(BRUME_E_UNSUPPORTED,
                     "%d directions of a lattice of %d x %d x %d cells are more than "
@@ -150,11 +152,12 @@ static void finish(struct dom_work *work)
 {
     struct memory *memory = &work->cells.input->gpu->memory;
     struct lpv_work *cells = &work->cells;
-    struct texture *all[] = {&work->sources,   &work->means,  &work->hits,       &work->slices[0],
-                             &work->slices[1], &work->cuts,   &work->wall,       &work->first,
-                             &work->world,     &work->now,    &work->next,       &cells->links,
-                             &cells->walls,    &work->depths, &work->missing[0], &work->missing[1],
-                             &work->missing[2]};
+    struct texture *all[] = {
+        &work->sources,    &work->means,       &work->hits,       &work->slices[0],
+        &work->slices[1],  &work->cuts,        &work->wall,       &work->first,
+        &work->world,      &work->now,         &work->next,       &cells->links,
+        &cells->walls,     &work->depths,      &work->missing[0], &work->missing[1],
+        &work->missing[2], &work->world_means, &work->emission};
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         texture_finish(memory, all[i]);
     for (int i = 0; i < HISTORY; ++i) {
@@ -218,6 +221,9 @@ static brume_result prepare(struct dom_work *work)
         image(SLOT_OUTPUT + c, &cells->cells[c]);
     image(SLOT_OUTPUT_FIELD, &work->cuts);
     image(SLOT_OUTPUT_FIELD + 1, &work->depths);
+    image(SLOT_OUTPUT_FIELD + 2, &work->emission);
+    TRY(program_compute(&cells->input->gpu->programs, "dom_cells", &program));
+    glProgramUniform1f(program->id, 0, cells->input->geometry->brightest);
     TRY(over_field(work, "dom_cells", (ivec4){0}));
     TRY(lpv_reflect(cells));
     laps_go(cells->laps, BRUME_FIELD_PREPARE);
@@ -280,6 +286,7 @@ static brume_result gather(struct dom_work *work, const struct texture *moments,
     glBindTextureUnit(SLOT_HITS, work->hits.id);
     glBindTextureUnit(SLOT_MOMENTS, work->now.id);
     glBindTextureUnit(SLOT_CELL_WALLS, work->wall.id);
+    glBindTextureUnit(SLOT_CELL_EMISSION, work->emission.id);
     image(SLOT_OUTPUT, moments);
     image(SLOT_OUTPUT + 1, &work->residuals[newest]);
     image(SLOT_OUTPUT + 2, &work->results[newest]);

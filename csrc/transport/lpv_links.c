@@ -47,9 +47,11 @@ static mat4 view_along(const struct gpu_field *field, const int link[3], int siz
 static brume_result draw(struct lpv_work *work, GLuint framebuffer)
 {
     const struct transport_input *input = work->input;
+    const float brightest = input->geometry->brightest;
     for (int i = 0; i < LINKS; ++i) {
         int size[2];
         const struct gpu_draw stage = {.clip_from_world = view_along(work->field, links[i], size),
+                                       .clip.w = brightest > 0.0f ? 1.0f / brightest : 0.0f,
                                        .info = {0, (uint32_t)i, 0, 0}};
         glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_WIDTH, size[0]);
         glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_HEIGHT, size[1]);

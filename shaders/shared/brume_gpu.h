@@ -86,6 +86,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_SLICE 26        /* radiance that leaves the slice of cells before */
 #define SLOT_CUTS 30
 #define SLOT_MOMENTS 34      /* and one more that a stage's shader names */
+#define SLOT_CELL_EMISSION 26 /* of the surfaces in a cell */
 #define SLOT_CELL_WALLS 31   /* radiance of the surfaces in a cell */
 #define SLOT_HISTORY 24      /* and three more: residuals, or results */
 #define SLOT_MEANS_AROUND 27 /* what cells' means are in the lattice around */
@@ -117,9 +118,14 @@ typedef struct mat4 { float m[16]; } mat4;
 #define ASIDE_Y 1.7e-4f
 #define ASIDE_Z 2.1e-4f
 
-/* Texels of a cell in the picture of its surfaces: sums of their reflectances and a count, and for the
- * links along the three axes how far along the last cut is, in 1/254, from 1; 0: there is none. */
-#define WALL_TEXELS 7
+/* Texels of a cell in the picture of its surfaces: sums, in 1/WALL_UNIT, of their reflectances and of
+ * what they emit, as shares of the brightest material's; a count; and for the links along the three
+ * axes how far along the last cut is, in 1/254, from 1; 0: there is none. */
+#define WALL_TEXELS 10
+#define WALL_EMISSION 3
+#define WALL_COUNT 6
+#define WALL_CUTS 7
+#define WALL_UNIT 1048575.0
 
 /* Cells along a brick's side: the unit of empty-space skipping. */
 #define BRICK_CELLS 8
@@ -211,7 +217,8 @@ struct gpu_instance {
 /* The drawing stages' block: one shadow layer, or the camera. */
 struct gpu_draw {
     mat4 clip_from_world;
-    vec4 clip;           /* near, far along the view; z: 1 orthographic */
+    vec4 clip;           /* near, far along the view; z: 1 orthographic; w: for links, the share of the
+                            brightest emission that a unit is */
     vec4 eye;            /* camera position, or the direction it looks along; w: 0 direction */
     uvec4 info;          /* x: seed of the alpha test; y: number of a link */
 };

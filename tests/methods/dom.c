@@ -436,6 +436,79 @@ static void light_between_walls(void **state)
     }
 }
 
+/* A closed box that glows and reflects: everywhere in it is the same light. */
+static void glowing_walls(void **state)
+{
+    (void)state;
+    const brume_settings settings = settings_for(16);
+    const brume_material glowing = {
+        .diffuse = {0.6f, 0.6f, 0.6f}, .emission = {200, 0.5f, 0.02f}, .roughness = 1, .alpha = 1};
+    const struct coefficients fog = {.sigma_s = {1, 1, 1}};
+    brume_scene *scene = empty();
+    add_box(scene, 1, 1.0f, 0.0f);
+    assert_ok(brume_scene_set_material(scene, 1, &glowing));
+    add_fog_cube(scene, 2, origin, 0.5f, &fog); /* changes nothing */
+    struct field field = field_of(scene, &settings, NULL);
+    for (int c = 0; c < 3; ++c) {
+        double mean = 0.0;
+        for (int z = 0; z < 16; ++z)
+            for (int y = 0; y < 16; ++y)
+                for (int x = 0; x < 16; ++x)
+                    mean += fluence(&field, (const int[3]){x, y, z}, c) / (16.0 * 16.0 * 16.0);
+        const double truth = 4.0 * PI * (double)glowing.emission[c] / (1.0 - 0.6);
+        print_message("glowing walls, emission %g: %+.2f %%\n", (double)glowing.emission[c],
+                      100.0 * (mean / truth - 1.0));
+        assert_close(mean, truth, 0.01);
+    }
+    free(field.texels);
+    brume_scene_destroy(scene);
+}
+
+/* A small box that glows in a room that reflects nothing. */
+static void glowing_thing(void **state)
+{
+    (void)state;
+    const brume_material glowing = {.emission = {1, 1, 1}, .roughness = 1, .alpha = 1};
+    const brume_settings settings = settings_for(32);
+    static const float at[3] = {0.13f, -0.21f, 0.3f};
+    const float half = 0.2f;
+    brume_scene *scene = empty();
+    add_box(scene, 1, 1.0f, 0.0f);
+    add_box_at(scene, 2, at, half, 0.0f);
+    assert_ok(brume_scene_set_material(scene, 2, &glowing));
+    struct field field = field_of(scene, &settings, NULL);
+    double found = 0.0, truth = 0.0;
+    for (int z = 0; z < 32; ++z)
+        for (int y = 0; y < 32; ++y)
+            for (int x = 0; x < 32; ++x) {
+                const int cell[3] = {x, y, z};
+                bool within = true;
+                for (int i = 0; i < 3; ++i)
+                    within = within && fabsf(centre(&field, i, cell[i]) - at[i]) < half;
+                found += within ? 0.0 : fluence(&field, cell, 0) / (32.0 * 32.0 * 32.0);
+            }
+    uint64_t lots = 88172645463325252u;
+    const int count = PHOTONS / 4;
+    for (int i = 0; i < count; ++i) { /* from its sides to the walls */
+        double p[3], d[3], way;
+        const int axis = i % 3;
+        const double sign = i / 3 % 2 ? 1.0 : -1.0;
+        const double sine = sqrt(lot(&lots)), turn = 2.0 * PI * lot(&lots);
+        for (int k = 0; k < 3; ++k)
+            p[k] = (double)at[k] + (double)half * (k == axis ? sign : 2.0 * lot(&lots) - 1.0);
+        d[axis] = sign * sqrt(1.0 - sine * sine);
+        d[(axis + 1) % 3] = sine * cos(turn);
+        d[(axis + 2) % 3] = sine * sin(turn);
+        wall_ahead(p, d, 1.0, &way);
+        truth += way / count;
+    }
+    truth *= PI * 24.0 * (double)half * (double)half / 8.0; /* W, over the room's volume */
+    print_message("a glowing thing: mean fluence %+.2f %%\n", 100.0 * (found / truth - 1.0));
+    assert_close(found, truth, 0.05);
+    free(field.texels);
+    brume_scene_destroy(scene);
+}
+
 /* --- Hostile scenes ------------------------------------------------------------------------- */
 
 static void nothing_odd_comes_out(void **state)
@@ -476,7 +549,10 @@ int main(void)
         cmocka_unit_test(slabs),
         cmocka_unit_test(cube),
         cmocka_unit_test(light_between_walls),
+        cmocka_unit_test(glowing_walls),
+        cmocka_unit_test(glowing_thing),
         cmocka_unit_test(nothing_odd_comes_out),
     };
+    cmocka_set_test_filter(getenv("BRUME_TESTS"));
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

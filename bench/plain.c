@@ -28,6 +28,21 @@ static size_t cells_of(const struct plain *plain)
     return (size_t)plain->cells * (size_t)plain->cells * (size_t)plain->cells;
 }
 
+/* A plane of moments and room after it: a cell's moments, powers of two apart, would fall into the
+ * same few lines of a cache. */
+static size_t moments_of(const struct plain *plain)
+{
+    return cells_of(plain) + 48;
+}
+
+/* Which row a thread takes: those that share lines of a cache follow one another, which along x are
+ * the next slice's. */
+static void row_of(int axis, int number, int n, int *along, int *row)
+{
+    *along = axis == 0 ? number % n : number / n;
+    *row = axis == 0 ? number / n : number % n;
+}
+
 static size_t wide_side(const struct plain *plain)
 {
     return (size_t)plain->cells + 2;
@@ -67,7 +82,6 @@ static int band_of(int moment)
     return moment < 1 ? 0 : (moment < 4 ? 1 : (moment < 9 ? 2 : 3));
 }
 
-/* Touched by the threads that will use it, and 0. */
 static float *zeros(size_t count)
 {
     return calloc(count, sizeof(float));
@@ -85,9 +99,9 @@ int plain_init(struct plain *plain, int cells, float side, int count, const floa
     const size_t n3 = cells_of(plain), wide = wide_side(plain);
     plain->albedo = zeros(3 * n3);
     plain->g = zeros(n3);
-    plain->first = zeros(3 * MOMENTS * n3);
-    plain->now = zeros(3 * MOMENTS * n3);
-    plain->next = zeros(3 * MOMENTS * n3);
+    plain->first = zeros(3 * MOMENTS * moments_of(plain));
+    plain->now = zeros(3 * MOMENTS * moments_of(plain));
+    plain->next = zeros(3 * MOMENTS * moments_of(plain));
     plain->sources = zeros(3 * (size_t)count * wide_cells(plain));
     plain->means = zeros(3 * (size_t)count * n3);
     int there = plain->albedo && plain->g && plain->first && plain->now && plain->next &&
@@ -107,7 +121,8 @@ int plain_init(struct plain *plain, int cells, float side, int count, const floa
         for (size_t c = 0; c < 3; ++c) {
             const float scatters = (1.0f - forward) * sigma_s[c], extinct = scatters + sigma_a[c];
             plain->albedo[c * n3 + i] = scatters / extinct;
-            plain->first[c * n3 + i] = emission[c] * 3.5449077018110318f / extinct; /* sqrt(4 pi) */
+            plain->first[c * moments_of(plain) + i] =
+                emission[c] * 3.5449077018110318f / extinct; /* sqrt(4 pi) */
             for (int axis = 0; axis < 3; ++axis)
                 plain->extinct[axis][c * n3 + i] = extinct;
         }
@@ -133,8 +148,10 @@ void plain_finish(struct plain *plain)
 /* --- An iteration --------------------------------------------------------------------------- */
 
 /* The sources along a major axis's ordinates, of a row of cells. */
-static void source_row(struct plain *plain, int axis, int begin, int along, int row)
+static void source_row(struct plain *plain, int axis, int begin, int number)
 {
+    int along, row;
+    row_of(axis, number, plain->cells, &along, &row);
     const int n = plain->cells;
     const size_t n3 = cells_of(plain), wide = wide_side(plain);
     float q[MOMENTS][3][MOST_CELLS];
@@ -147,7 +164,7 @@ static void source_row(struct plain *plain, int axis, int begin, int along, int 
         const float bands[4] = {1.0f, (g - f) * part, (g * g - f) * part, (g * g * g - f) * part};
         for (int m = 0; m < MOMENTS; ++m)
             for (size_t c = 0; c < 3; ++c) {
-                const size_t at = (3 * (size_t)m + c) * n3 + cell;
+                const size_t at = (3 * (size_t)m + c) * moments_of(plain) + cell;
                 q[m][c][u] = plain->first[at] +
                              plain->albedo[c * n3 + cell] * bands[band_of(m)] * plain->now[at];
             }
@@ -266,8 +283,10 @@ static void sweep(struct plain *plain, int axis, int k, float *slices)
 }
 
 /* What a row's moments have of a major axis's ordinates. */
-static void gather_row(struct plain *plain, int axis, int begin, int along, int row)
+static void gather_row(struct plain *plain, int axis, int begin, int number)
 {
+    int along, row;
+    row_of(axis, number, plain->cells, &along, &row);
     const int n = plain->cells;
     const size_t n3 = cells_of(plain);
     const size_t here = ((size_t)along * (size_t)n + (size_t)row) * (size_t)n;
@@ -286,7 +305,7 @@ static void gather_row(struct plain *plain, int axis, int begin, int along, int 
             }
         }
         for (int m = 0; m < MOMENTS; ++m) {
-            float *out = plain->next + (3 * (size_t)m + c) * n3 + start;
+            float *out = plain->next + (3 * (size_t)m + c) * moments_of(plain) + start;
             for (int u = 0; u < n; ++u) {
                 float *sum = out + (size_t)u * strides[0];
                 *sum = (axis > 0 ? *sum : 0.0f) + sums[m][u];
@@ -310,7 +329,7 @@ void plain_iterate(struct plain *plain)
     for (int axis = 0; axis < 3; ++axis) {
 #pragma omp parallel for schedule(dynamic, 16)
         for (int i = 0; i < n * n; ++i)
-            source_row(plain, axis, begins[axis], i / n, i % n);
+            source_row(plain, axis, begins[axis], i);
     }
     plain->spent_ms[PLAIN_SOURCE] += lap(&since);
 #pragma omp parallel
@@ -327,7 +346,7 @@ void plain_iterate(struct plain *plain)
     for (int axis = 0; axis < 3; ++axis) {
 #pragma omp parallel for schedule(dynamic, 16)
         for (int i = 0; i < n * n; ++i)
-            gather_row(plain, axis, begins[axis], i / n, i % n);
+            gather_row(plain, axis, begins[axis], i);
     }
     plain->spent_ms[PLAIN_GATHER] += lap(&since);
     float *found = plain->next;
@@ -337,5 +356,6 @@ void plain_iterate(struct plain *plain)
 
 double plain_fluence(const struct plain *plain, int cell, int color)
 {
-    return 3.5449077018110318 * (double)plain->now[(size_t)color * cells_of(plain) + (size_t)cell];
+    return 3.5449077018110318 *
+           (double)plain->now[(size_t)color * moments_of(plain) + (size_t)cell];
 }

@@ -31,10 +31,11 @@ def here():
             'load': os.getloadavg()[0]}
 
 
-def keep(line):
-    """Appends it to out/bench/NAME.jsonl, by its "bench", and prints it."""
+def keep(line, shown=True):
+    """Appends it to out/bench/NAME.jsonl, by its "bench", and prints it where it is to be shown."""
     folder = os.path.join(ROOT, 'out', 'bench')
     os.makedirs(folder, exist_ok=True)
     with open(os.path.join(folder, f'{line["bench"]}.jsonl'), 'a', encoding='utf-8') as file:
         file.write(json.dumps(line) + '\n')
-    print(json.dumps(line, indent=1))
+    if shown:
+        print(json.dumps(line, indent=1))

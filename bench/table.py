@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the Markdown tables of the docs from the JSON lines of bench/peers.py, viewport.py,
-export.py, opv.py, lpv.py or lpv_parts.py.
+export.py, opv.py, lpv.py, lpv_parts.py, dom.py or dom_time.py.
 
     python3 bench/table.py FILE.jsonl [--into docs/PAGE.md]
 
@@ -239,9 +239,137 @@ def lpv_parts_page(lines):
     yield ''
 
 
+BESIDE = {'shaders_ms': 'shaders: iteration', 'plain_ms': 'plain C: iteration',
+          'source_ms': 'its source', 'sweep_ms': 'sweep', 'gather_ms': 'gather'}
+SERIES = {'cells': ('cells', lambda value: f'{value}³'),
+          'ordinates': ('directions', str), 'iterations': ('iterations', str)}
+
+
+def beside_table(beside):
+    yield row('cells', 'directions', *(f'{name}, ms' for name in BESIDE.values()),
+              'shaders, million cells and directions a second', 'plain C', 'fields apart')
+    yield row('---:', '---:', *['---:'] * (len(BESIDE) + 3))
+    for found in beside:
+        amount = found['cells'] ** 3 * found['ordinates'] / 1e3
+        yield row(f'{found["cells"]}³', found['ordinates'],
+                  *(f'{found[key]:.1f}' for key in BESIDE),
+                  *(f'{amount / found[key]:.1f}' for key in ('shaders_ms', 'plain_ms')),
+                  f'{100 * found["apart"]:.2f} %')
+
+
+def costs_table(costs):
+    yield row('', 'all iterations, ms', 'ns a cell, direction and iteration', 'off the line')
+    yield row('---', *['---:'] * 3)
+    for key, entries in costs.items():
+        name, told = SERIES[key]
+        for entry in entries:
+            yield row(f'{told(entry["value"])} {name}', f'{entry["ms"]:.1f}', f'{entry["ns"]:.0f}',
+                      f'{100 * entry["off"]:+.0f} %')
+
+
+def memory_table_of_dom(memory, sizes):
+    yield row('cells', 'directions', 'kept: bytes a cell', 'at most', 'as reckoned')
+    yield row(*['---:'] * 5)
+    for entry in memory:
+        reckoned = (sizes['cell_bytes'] + sizes['working_bytes']
+                    + sizes['ordinate_bytes'] * entry['ordinates'])
+        yield row(f'{entry["cells"]}³', entry['ordinates'], f'{entry["kept"]:.0f}',
+                  f'{entry["most"]:.0f}', reckoned)
+
+
+def dom_page(lines):
+    line = lines[-1]
+    usual = line['usual']
+    yield (f'{line["device"]}; {line["processor"]}, {line["threads"]} threads; commit '
+           f'{version(line)}. Medians of {line["repeats"]}. Shaders also compare and mix '
+           'iterations, which plain C does not.')
+    yield ''
+    yield from beside_table(line['beside'])
+    yield ''
+    yield (f'Shaders, with {usual["cells"]}³ cells, {usual["ordinates"]} directions and '
+           f'{usual["iterations"]} iterations where nothing else is said; *off the line*: from the '
+           'straight line through the series:')
+    yield ''
+    yield from costs_table(line['costs'])
+    yield ''
+    yield 'Memory, optical depths included; what is reckoned is without these:'
+    yield ''
+    yield from memory_table_of_dom(line['memory'], line['beside'][0])
+    yield ''
+
+
+KINDS = {'OPV': 'OPV', 'LPV': 'LPV', 'DOM_DRAFT': 'DOM, Draft', 'DOM_PREVIEW': 'DOM, Preview',
+         'DOM_FINAL': 'DOM, Final', 'EEVEE': 'EEVEE'}
+
+
+def dom_time_rows(name, found):
+    for kind, frame in found['frames'].items():
+        other = frame['cycles']['pixels']
+        yield row(f'`{name}.blend`', KINDS[kind], f'{frame["wall_s"]:.2f}',
+                  f'{100 * frame["pixels"]:.1f} %', f'{100 * frame["blocks"]:.1f} %',
+                  f'{other["samples"]:.0f}', f'{other["wall_s"]:.1f}',
+                  f'{other["wall_s"] / frame["wall_s"]:.1f}',
+                  f'{other["cpu_s"] / frame["cpu_s"]:.1f}')
+
+
+def spent_table(scenes, kind):
+    """Where the time of a method's frames goes."""
+    some = next(iter(scenes.values()))['frames'][kind]
+    parts = [part for part in some['field_ms']
+             if any(found['frames'][kind]['field_ms'][part] for found in scenes.values())]
+    yield row('', 'export', *some['stages_ms'], *parts, 'iterations done')
+    yield row('---', *['---:'] * (2 + len(some['stages_ms']) + len(parts)))
+    for name, found in scenes.items():
+        frame = found['frames'][kind]
+        yield row(f'`{name}.blend`', *(f'{value:.0f}' for value in (
+            frame['export_ms'], *frame['stages_ms'].values(),
+            *(frame['field_ms'][part] for part in parts), frame['iterations'])))
+
+
+def dom_time_page(lines):
+    """The newest measurement of each scene in the newest one's resolution."""
+    line = lines[-1]
+    width, height = line['resolution']
+    scenes = {some['scene']: some for some in lines if some['resolution'] == line['resolution']}
+    versions = dict.fromkeys(version(found) for found in scenes.values())
+    yield (f'{width}x{height} pixels; {line["device"]}; {line["processor"]}, {line["threads"]} '
+           f'threads; commit {", ".join(versions)}.')
+    yield ''
+    yield row('scene', 'engine', 'frame, s', 'pixels off', 'blocks off', 'Cycles\' samples',
+              'its time, s', 'times as long', 'of the processor')
+    yield row('---', '---', *['---:'] * 7)
+    for name, found in scenes.items():
+        yield from dom_time_rows(name, found)
+    yield ''
+    yield 'Cycles as it was measured, and how its squared errors fell with its samples N:'
+    yield ''
+    yield row('scene', 'samples', 'time, s', 'pixels off', 'N to the', 'farthest from the fit',
+              'reference')
+    yield row('---', *['---:'] * 6)
+    for name, found in scenes.items():
+        points, fitted = found['cycles'], found['fit']
+        yield row(f'`{name}.blend`', ' / '.join(str(point['samples']) for point in points),
+                  ' / '.join(f'{point["wall_s"]:.1f}' for point in points),
+                  ' / '.join(f'{100 * point["pixels"]:.1f} %' for point in points),
+                  f'{fitted["pixels_power"]:.2f}', f'{100 * fitted["pixels_misfit"]:.0f} %',
+                  f'{found["reference"]["samples"]} samples')
+    yield ''
+    for kind in ('DOM_DRAFT', 'DOM_PREVIEW', 'DOM_FINAL'):
+        if not all(kind in found['frames'] for found in scenes.values()):
+            continue
+        yield f'{KINDS[kind]}: stages, wall time in ms; from the ninth on parts of transport:'
+        yield ''
+        yield from spent_table(scenes, kind)
+        yield ''
+    for name in scenes:
+        yield f'![{name}: error against time](../images/dom_time_{name}.svg)'
+        yield ''
+
+
 PAGES = {'peers': page, 'viewport': viewport_page}
 WHOLE_PAGES = {'export': export_page, 'opv': opv_page, 'lpv': lpv_page,
-               'lpv_parts': lpv_parts_page}
+               'lpv_parts': lpv_parts_page, 'dom': dom_page,
+               'dom_time': dom_time_page}
 
 
 def main():

@@ -11,6 +11,7 @@
 #define DOM_WORKING_BYTES (32 * MOMENTS + HISTORY * 16 * MIXED + 168)
 #define DOM_ORDINATE_BYTES 24
 #define DOM_AROUND_BYTES 8
+#define DOM_SLICE_BYTES 16 /* of a slice's cell, for each ordinate */
 
 /* The ordinates of a quadrature with so many, 26, 48 or 96, sorted by their major axes: directions
  * and weights, sr. docs/methods/dom.md says what they integrate exactly. Returns how many have each

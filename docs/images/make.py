@@ -20,6 +20,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "bench"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "pictures"))
 import compare
+import cycles
 import lpv
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -165,8 +166,8 @@ def lpv_hard(name):
                   "settings": {"method": 'LPV', "blockers": 'LINKS', "iterations": 0, **settings}}
                  for settings in brume]
         jobs.append({"camera": camera, "engine": 'CYCLES',
-                     "settings": {**lpv.CYCLES, "samples": 384}})
-    pictures = lpv.run(lpv.Case("partition", 0), jobs)
+                     "settings": {**cycles.CYCLES, "samples": 384}})
+    pictures, _ = cycles.run(cycles.Case("partition", 0, lpv.SIZE), jobs)
     dark, lit = exposure_of(pictures[1]), exposure_of(pictures[3])
     sheet(name, pictures, 3, [dark] * 3 + [lit] * 3)
 

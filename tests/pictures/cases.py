@@ -29,8 +29,11 @@ class Case:
     groups: tuple = ()
     world_samples: int = 0  # Brume's; 0: the default
     passes: tuple = ()      # beyond Combined: of "Depth", "Normal", "Emit", "Env"
-    method: str = 'OPV'     # Brume's; with another, Cycles goes on for 64 bounces
+    method: str = 'OPV'     # Brume's; with another, Cycles goes on for `bounces`
     twin: bool = False      # Cycles renders SCENE_twin.blend, which looks the same to it
+    bounces: int = 64       # Cycles', with methods other than OPV
+    # Only the blocks count that look otherwise without the media
+    medium_only: bool = False
 
     @property
     def name(self):

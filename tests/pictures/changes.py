@@ -61,6 +61,16 @@ def fog_on_film(scene):
     scene.objects['Floor'].hide_render = True
 
 
+def isotropic(scene):
+    fog = scene.objects['Fog'].active_material.node_tree.nodes['Volume Scatter']
+    fog.inputs['Anisotropy'].default_value = 0.0
+
+
+def forward(scene):
+    fog = scene.objects['Fog'].active_material.node_tree.nodes['Volume Scatter']
+    fog.inputs['Anisotropy'].default_value = 0.8
+
+
 def sky_alone(scene):
     """A plain sky over matt things that hide it from one another."""
     for thing in scene.objects:

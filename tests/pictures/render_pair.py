@@ -4,8 +4,9 @@
 blender -b -P render_pair.py -- --engine CYCLES --seed 0 --out FOLDER CASE...
 
 --preset FINAL has Brume's settings changed at once before the case's; --without-media leaves fog
-and smoke out and takes few samples. It writes FOLDER/CASE.npz: float32 (height, width, channels) by pass, linear, first row at the bottom.
-It goes the way that users go: bpy.ops.render.render to a multi-layer EXR, which is read back.
+and smoke out and takes few samples. It writes FOLDER/CASE.npz: float32 (height, width, channels) by
+pass, linear, first row at the bottom. It goes the way that users go: bpy.ops.render.render to a
+multi-layer EXR, which is read back.
 """
 import argparse
 import os

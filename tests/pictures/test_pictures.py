@@ -113,7 +113,7 @@ def test_measure_sees_what_it_should():
 
 
 def test_changed_blocks():
-    """A change of 1 % does not count, one of 3 % does, and in the dark the mean is the yardstick."""
+    """A change of 1 % does not count, one of 3 % does; in the dark the mean is the yardstick."""
     plain = np.ones((128, 128, 3))
     plain[:64] = 0.0
     picture = plain.copy()

@@ -29,8 +29,11 @@ class Case:
     groups: tuple = ()
     world_samples: int = 0  # Brume's; 0: the default
     passes: tuple = ()      # beyond Combined: of "Depth", "Normal", "Emit", "Env"
-    method: str = 'OPV'     # Brume's; with another, Cycles goes on for 64 bounces
+    method: str = 'OPV'     # Brume's; with another, Cycles goes on for `bounces`
     twin: bool = False      # Cycles renders SCENE_twin.blend, which looks the same to it
+    bounces: int = 64       # Cycles', with methods other than OPV
+    # Only the blocks count that look otherwise without the media
+    medium_only: bool = False
 
     @property
     def name(self):
@@ -102,4 +105,14 @@ CASES = {case.name: case for case in (
     Case('cloud', (), 0.04, 512, zoom=1.15, method='DOM'),
     Case('room', (), 0.10, 2048, method='DOM'),
     Case('room_smoke', (), 0.10, 1024, method='DOM'),
+    Case('cube', (), 0.04, 256, zoom=1.4, change='isotropic', method='DOM', medium_only=True),
+    Case('cube', (), 0.05, 1024, zoom=1.4, change='forward', method='DOM', medium_only=True),
+    # White media of this thickness scatter a tenth of their light more often than 64 times. The
+    # floor beyond DOM's lattice neither hides the sky from these two nor lights them.
+    Case('cube', (), 0.10, 256, zoom=1.4, change='milk', method='DOM', medium_only=True,
+         bounces=1024),
+    Case('plume', (), 0.10, 256, zoom=1.6, method='DOM', medium_only=True),
+    # DOM has the small sun come along the ordinate next to it; the same as a lamp is 4 % off.
+    Case('smoke_sky', (), 0.16, 768, method='DOM', medium_only=True),
+    Case('lantern', (), 0.08, 1024, method='DOM', medium_only=True),
 )}

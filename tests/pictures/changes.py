@@ -61,6 +61,25 @@ def fog_on_film(scene):
     scene.objects['Floor'].hide_render = True
 
 
+def isotropic(scene):
+    fog = scene.objects['Fog'].active_material.node_tree.nodes['Volume Scatter']
+    fog.inputs['Anisotropy'].default_value = 0.0
+
+
+def forward(scene):
+    fog = scene.objects['Fog'].active_material.node_tree.nodes['Volume Scatter']
+    fog.inputs['Anisotropy'].default_value = 0.8
+
+
+def milk(scene):
+    """Optical thickness 24 across, nothing absorbed, a light sky."""
+    fog = scene.objects['Fog'].active_material.node_tree.nodes['Volume Scatter']
+    fog.inputs['Color'].default_value = (1.0, 1.0, 1.0, 1.0)
+    fog.inputs['Density'].default_value = 12.0
+    fog.inputs['Anisotropy'].default_value = 0.0
+    scene.world.node_tree.nodes['Background'].inputs['Strength'].default_value = 1.0
+
+
 def sky_alone(scene):
     """A plain sky over matt things that hide it from one another."""
     for thing in scene.objects:

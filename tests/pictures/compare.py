@@ -21,17 +21,27 @@ def block_means(picture, blocks=BLOCKS):
     return tiles.mean(axis=(1, 3))
 
 
-def difference(picture, reference, blocks=BLOCKS):
-    """(all channels, [each channel]): sum |picture - reference| / sum reference of block means."""
+def difference(picture, reference, blocks=BLOCKS, where=None):
+    """(all channels, [each channel]): sum |picture - reference| / sum reference of block means,
+    over the blocks that `where` picks (blocks x blocks, boolean), or all."""
     if picture.shape != reference.shape:
         raise ValueError(f'shapes {picture.shape} and {reference.shape} differ')
     if not np.isfinite(picture).all():
         raise ValueError('the picture has NaN or infinite pixels')
     a, b = block_means(picture, blocks), block_means(reference, blocks)
+    if where is not None:
+        a, b = a * where[..., None], b * where[..., None]
     apart, whole = np.abs(a - b).sum(axis=(0, 1)), b.sum(axis=(0, 1))
     if not whole.sum() > 0.0:
         raise ValueError('the reference is black')
     return apart.sum() / whole.sum(), (apart / np.maximum(whole, 1e-30)).tolist()
+
+
+def changed(picture, plain, share=0.02, blocks=BLOCKS):
+    """The blocks where `picture` differs from `plain` by more than `share` of `plain`'s value there
+    or, where that is darker than the mean, of the mean: a black sky has no share to exceed."""
+    a, b = (block_means(image, blocks).sum(axis=-1) for image in (picture, plain))
+    return np.abs(a - b) > share * np.maximum(b, b.mean())
 
 
 def side_by_side(path, picture, reference, gain=4.0):

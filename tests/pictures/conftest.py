@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The options of the comparison: --refresh renders the Cycles references again, --write-table puts
-the differences of a run into the page of the method."""
+the differences of a run into the page of the method, --preset takes another of Brume's presets."""
 import os
 
 import blenders
@@ -18,6 +18,9 @@ def pytest_addoption(parser):
                      help='render the Cycles references of the selected cases again')
     parser.addoption('--write-table', action='store_true',
                      help='write the differences into docs/methods/opv.md')
+    parser.addoption('--preset', default='PREVIEW', choices=('DRAFT', 'PREVIEW', 'FINAL'),
+                     help="Brume's; the cases' tolerances are those of PREVIEW, and FINAL takes "
+                          "minutes a case on a software GL")
 
 
 def pytest_collection_modifyitems(config, items):

@@ -3,7 +3,8 @@
 
 `pytest tests/pictures --refresh` renders them again (about ten minutes on two cores). Each file
 holds the mean of two seeds in half floats (depth and object numbers: the first seed's), the
-difference between the two, and a digest of what it was made from.
+difference between the two, and a digest of what it was made from; with all bounces also the blocks
+that the media change, found by a coarse picture without them.
 """
 import glob
 import hashlib
@@ -14,19 +15,20 @@ import tempfile
 
 import changes
 import numpy as np
-from cases import REFERENCES, SCENES
-from compare import difference
+from cases import REFERENCES, SCENES, Case
+from compare import changed, difference
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 
 
-def render(blender, engine, case, seed=0, timeout=900):
-    """The case's passes from a Blender process of its own. `blender`: the command, a list."""
+def render(blender, engine, case, *options, seed=0, timeout=900):
+    """The case's passes from a Blender process of its own. `blender`: the command, a list;
+    `options`: more of render_pair.py's."""
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(
             [*blender, '-b', '--python-exit-code', '1',
              '-P', os.path.join(HERE, 'render_pair.py'), '--', '--engine', engine,
-             '--seed', str(seed), '--out', folder, case.name],
+             '--seed', str(seed), '--out', folder, *options, case.name],
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=timeout)
         path = os.path.join(folder, case.name + '.npz')
         if done.returncode or not os.path.exists(path):
@@ -45,6 +47,8 @@ def digest(case):
         found.update(inspect.getsource(getattr(changes, case.change)).encode())
     if case.method != 'OPV':
         found.update(b'all bounces')
+    if case.bounces != Case.bounces:
+        found.update(repr(case.bounces).encode())
     if case.groups or case.passes:
         found.update(repr((bool(case.groups), case.passes)).encode())
     data = sorted(glob.glob(os.path.join(SCENES, case.scene + '.[eh][xd]r')))
@@ -64,24 +68,30 @@ def path_of(case):
 def refresh(case):
     """Renders the case in Cycles with two seeds and writes its file."""
     blender = [os.environ.get('BLENDER', 'blender'), '--factory-startup']
-    one, two = (render(blender, 'CYCLES', case, seed) for seed in (0, 1))
+    one, two = (render(blender, 'CYCLES', case, seed=seed) for seed in (0, 1))
     found = {name: ((one[name] + two[name]) / 2).astype(np.float16)
              for name in one if name not in {'Depth', 'IndexOB'}}
     if 'Depth' in one:
         found['Depth'] = one['Depth']
     if 'IndexOB' in one:
         found['IndexOB'] = one['IndexOB'].astype(np.uint8)
+    one, two = one['Combined'][..., :3], two['Combined'][..., :3]
+    where = None
+    if case.method != 'OPV':    # all methods share the file, medium_only or not
+        plain = render(blender, 'CYCLES', case, '--without-media')['Combined'][..., :3]
+        found['medium'] = changed((one + two) / 2, plain)
+        where = found['medium'] if case.medium_only else None
     os.makedirs(REFERENCES, exist_ok=True)
     np.savez_compressed(path_of(case), digest=digest(case), **found,
-                        apart=difference(one['Combined'][..., :3], two['Combined'][..., :3])[0])
+                        apart=difference(one, two, where=where)[0])
 
 
 def load(case):
-    """(passes, difference between the two halves)."""
+    """(passes, difference between the two halves, which blocks count or None for all)."""
     with np.load(path_of(case)) as file:
         if str(file['digest']) != digest(case):
             raise RuntimeError(f'{path_of(case)} was made from other files or settings than '
                                f'{case.name} has now: run pytest tests/pictures --refresh')
         passes = {name: file[name].astype(np.float32) for name in file
-                  if name not in {'digest', 'apart'}}
-        return passes, float(file['apart'])
+                  if name not in {'digest', 'apart', 'medium'}}
+        return passes, float(file['apart']), file['medium'] if case.medium_only else None

@@ -3,8 +3,10 @@
 
 blender -b -P render_pair.py -- --engine CYCLES --seed 0 --out FOLDER CASE...
 
-writes FOLDER/CASE.npz: float32 (height, width, channels) by pass, linear, first row at the bottom.
-It goes the way that users go: bpy.ops.render.render to a multi-layer EXR, which is read back.
+--preset FINAL has Brume's settings changed at once before the case's; --without-media leaves fog
+and smoke out and takes few samples. It writes FOLDER/CASE.npz: float32 (height, width, channels) by
+pass, linear, first row at the bottom. It goes the way that users go: bpy.ops.render.render to a
+multi-layer EXR, which is read back.
 """
 import argparse
 import os
@@ -49,6 +51,25 @@ def set_up(scene, case):
     case.apply(scene)
 
 
+def _input(tree, name):
+    """The socket of that name of the output that renders, or None."""
+    output = tree.get_output_node('ALL') or tree.get_output_node('CYCLES') if tree else None
+    return output.inputs[name] if output else None
+
+
+def leave_media_out(scene):
+    """Objects of volumes alone go; of others, and of the world, the volume does."""
+    for thing in scene.objects:
+        trees = [slot.material.node_tree for slot in thing.material_slots if slot.material]
+        media = [tree for tree in trees if (socket := _input(tree, 'Volume')) and socket.is_linked]
+        if media and not any(_input(tree, 'Surface').is_linked for tree in media):
+            thing.hide_render = True
+    for tree in [block.node_tree for block in (*bpy.data.materials, scene.world)]:
+        socket = _input(tree, 'Volume')
+        if socket and socket.is_linked:
+            tree.links.remove(socket.links[0])
+
+
 def set_up_cycles(scene, case, seed):
     cycles = scene.cycles
     cycles.device, cycles.seed = 'CPU', seed
@@ -57,7 +78,7 @@ def set_up_cycles(scene, case, seed):
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     cycles.light_sampling_threshold = 0.0
     # No bounce beyond the first scattering, unless the method has them.
-    bounces = 0 if case.method == 'OPV' else 64
+    bounces = 0 if case.method == 'OPV' else case.bounces
     cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = bounces
     cycles.transmission_bounces = cycles.volume_bounces = bounces
     cycles.transparent_max_bounces = 256
@@ -88,6 +109,8 @@ def main(arguments):
     parser.add_argument('--engine', required=True)
     parser.add_argument('--seed', type=int, default=0)
     parser.add_argument('--out', required=True)
+    parser.add_argument('--preset')
+    parser.add_argument('--without-media', action='store_true')
     parser.add_argument('cases', nargs='+', choices=CASES)
     options = parser.parse_args(arguments)
     for name in options.cases:
@@ -97,7 +120,12 @@ def main(arguments):
         set_up(scene, case)
         if options.engine == 'CYCLES':
             set_up_cycles(scene, case, options.seed)
+            if options.without_media:
+                leave_media_out(scene)
+                scene.cycles.samples = min(case.cycles_samples, 128)
         elif options.engine == 'BRUME':
+            if options.preset:
+                scene.brume.preset = options.preset
             scene.brume.samples = case.samples
             scene.brume.method = case.method
             if case.world_samples:

@@ -26,7 +26,7 @@ layout(binding = SLOT_OUTPUT_FIELD + 2, rgba16f) writeonly uniform image3D emiss
 
 layout(location = 0) uniform float brightest; // emission of a surface
 
-const int POINTS = 128; // along the lattice
+const int POINTS = 6; // along a cell, at most
 
 void main()
 {
@@ -35,27 +35,9 @@ void main()
         return;
     float side = level.lower.w;
     vec3 lower = level.lower.xyz + vec3(cell) * side;
-    vec3 extinct = vec3(0.0), scatter = vec3(0.0);
-    float g_sum = 0.0, g_weight = 0.0;
-    if (medium_exists()) {
-        int points = points_in_cell(POINTS, 4);
-        int all = points * points * points;
-        for (int i = 0; i < all; ++i) {
-            vec3 p = point_in_cell(cell, i, points);
-            if (!in_box(p, frame.medium_lower.xyz, frame.medium_upper.xyz))
-                continue;
-            vec3 uvw = medium_coordinate(p);
-            vec4 s = textureLod(medium_scatter, uvw, 0.0);
-            extinct += textureLod(medium_extinct, uvw, 0.0).rgb;
-            scatter += s.rgb * (1.0 - forward_share(s.a));
-            g_sum += s.a * luminance(s.rgb);
-            g_weight += luminance(s.rgb);
-        }
-        extinct /= float(all);
-        scatter /= float(all);
-        g_sum /= float(all);
-        g_weight /= float(all);
-    }
+    medium_mean medium = mean_of_medium(lower + 0.5 * side, side, POINTS);
+    vec3 extinct = medium.sigma_t, scatter = medium.sigma_s_scaled;
+    float g_weight = luminance(medium.sigma_s), g_sum = medium.g * g_weight;
     if (fog_exists()) {
         vec3 filled = clamp((min(frame.fog_upper.xyz, lower + side) -
                              max(frame.fog_lower.xyz, lower)) / side, 0.0, 1.0);

@@ -22,21 +22,14 @@ layout(binding = SLOT_MOMENTS) uniform sampler3D world_moments;
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D first_image;
 
 const int POINTS = 64; // along the lattice
+const int POINTS_IN_PART = 3; // that the medium is asked at, along a part of a cell, at most
 
 // What the media scatter in a cube of side `part` around a point, of all lamps' light, and emit.
 void add_point(inout vec3 q[MOMENTS], vec3 p, float part, uint lot)
 {
-    vec3 sigma_s = vec3(0.0), extinct = vec3(0.0), emission = vec3(0.0);
-    float g = 0.0;
-    if (medium_exists() && in_box(p, frame.medium_lower.xyz, frame.medium_upper.xyz)) {
-        vec3 uvw = medium_coordinate(p);
-        vec4 scatter = textureLod(medium_scatter, uvw, 0.0);
-        sigma_s = scatter.rgb;
-        g = scatter.a;
-        extinct = textureLod(medium_extinct, uvw, 0.0).rgb;
-        if (frame.medium_upper.w != 0.0)
-            emission = textureLod(medium_emission, uvw, 0.0).rgb;
-    }
+    medium_mean medium = mean_of_medium(p, part, POINTS_IN_PART);
+    vec3 sigma_s = medium.sigma_s, extinct = medium.sigma_t, emission = medium.emission;
+    float g = medium.g;
     if (fog_exists() && in_box(p, frame.fog_lower.xyz, frame.fog_upper.xyz)) {
         add_fog(sigma_s, g);
         extinct += frame.fog_sigma_t.rgb;

@@ -56,7 +56,7 @@ void main()
     for (int i = 0; i < 4; ++i)
         ordinates.list[number].harmonics[i] =
             vec4(y[4 * i], y[4 * i + 1], y[4 * i + 2], y[4 * i + 3]);
-    ordinates.list[number].world = vec4(sum.rgb / max(sum.w, 1.0), 0.0);
+    ordinates.list[number].world = ordinates.list[number].sky = vec4(sum.rgb / max(sum.w, 1.0), 0.0);
     vec3 direction = ordinates.list[number].direction.xyz;
     int axis = major_axis(direction);
     ivec3 way = ivec3(sign(turned(axis, direction)));

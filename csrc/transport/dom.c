@@ -20,8 +20,10 @@ struct dom_work {
     struct lpv_work cells;         /* the lattice: what it is filled with, and its surfaces */
     const struct dom_work *around; /* the lattice around, whose light is known; or NULL */
     int number;                    /* of the lattice, from outside */
+    bool surrounded;               /* the outermost: whether surfaces stand beyond its sides */
     bool has_within;               /* whether another stands in it */
     int count, axes[3];            /* ordinates: all, and by their major axes */
+    vec4 directions[MOST_ORDINATES];
     int across;                    /* tiles of theirs along z */
     struct buffer ordinates, dots;
     struct texture sources, means, hits; /* by ordinates */
@@ -79,10 +81,10 @@ static brume_result make_cells(struct dom_work *work)
                            "surfaces' reflectances");
 }
 
-/* Whether the world sends light into the lattice. */
+/* Whether light comes into the lattice from outside that no lamp of the scene sends there. */
 static bool has_world(const struct dom_work *work)
 {
-    return work->cells.input->world_count > 0;
+    return work->cells.input->world_count > 0 || work->surrounded;
 }
 
 /* Tiles of ordinates fill a column along z, then the next along y. */
@@ -102,7 +104,7 @@ static brume_result make_ordinates(struct dom_work *work)
     struct gpu_ordinates *block = calloc(1, sizeof *block);
     if (!block)
         return fail(BRUME_E_MEMORY, "no memory for ordinates");
-    vec4 directions[MOST_ORDINATES];
+    vec4 *directions = work->directions;
     dom_quadrature(work->count, directions, work->axes);
     block->count = (ivec4){work->count, work->across, 0, 0};
     for (int i = 0; i < work->count; ++i)
@@ -230,7 +232,9 @@ static brume_result prepare(struct dom_work *work)
     TRY(program_compute(&cells->input->gpu->programs, "dom_ordinates", &program));
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ORDINATES, work->ordinates.id);
     program_dispatch(program, GROUP_REST * work->count, 1, 1);
-    glMemoryBarrier(GL_UNIFORM_BARRIER_BIT);
+    glMemoryBarrier(GL_UNIFORM_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    if (work->surrounded && !work->around)
+        TRY(dom_look_out(cells, &work->ordinates, work->directions, work->count));
     clear(&work->wall);
     clear(&work->now);
     clear(&work->hits);
@@ -573,6 +577,8 @@ brume_result dom_run(struct transport *transport, const struct transport_input *
             .around = i ? &works[i - 1] : NULL,
             .number = i,
             .has_within = i + 1 < levels,
+            .surrounded = dom_has_surroundings(
+                &(struct lpv_work){.input = input, .field = &input->frame->fields[0]}),
             .count = input->settings->ordinates,
         };
     const brume_result result = find(works, levels, transport);

@@ -18,6 +18,13 @@
  * axis. */
 void dom_quadrature(int count, vec4 directions[MOST_ORDINATES], int axes[3]);
 
+/* Whether geometry reaches beyond the lattice. */
+bool dom_has_surroundings(const struct lpv_work *cells);
+/* Puts what surfaces beyond the lattice send along each ordinate in the place of the world that they
+ * hide; ordinates and lattice are there and bound. */
+brume_result dom_look_out(struct lpv_work *cells, const struct buffer *ordinates,
+                          const vec4 *directions, int count);
+
 /* Shares of the results of `count` iterations, 1 together, that make their residuals' sum least;
  * from the residuals' products. Any thread. */
 void dom_mix_shares(int count, double products[HISTORY][HISTORY], double shares[HISTORY]);

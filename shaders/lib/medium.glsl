@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The media: the lattice of all volumes, and the world's homogeneous medium, kept analytic.
 #include "lib/frame.glsl"
+#include "lib/phase.glsl"
 
 layout(binding = SLOT_MEDIUM_SCATTER) uniform sampler3D medium_scatter;   // sigma_s, mean cosine
 layout(binding = SLOT_MEDIUM_EXTINCT) uniform sampler3D medium_extinct;   // sigma_t
@@ -16,6 +17,50 @@ vec3 medium_coordinate(vec3 p)
 {
     return (p - frame.medium_lower.xyz) /
            (frame.medium_lower.w * vec3(textureSize(medium_extinct, 0)));
+}
+
+// The lattice's medium in a cube of that side around a point: means, of g by how much each part scatters.
+struct medium_mean
+{
+    vec3 sigma_s, sigma_t, emission;
+    vec3 sigma_s_scaled; // strong forward scattering counts as none
+    float g;
+};
+
+// Asked at points a cell of the medium apart, or nearly: texels are then asked for as they weigh, so that
+// thick media are as thick in cells that their sides pass through.
+medium_mean mean_of_medium(vec3 p, float side, int most)
+{
+    medium_mean m = medium_mean(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    vec3 reach = vec3(0.5 * side);
+    bool near = medium_exists() && all(lessThan(frame.medium_lower.xyz, p + reach)) &&
+                all(lessThan(p - reach, frame.medium_upper.xyz));
+    int points = near ? clamp(int(ceil(side / frame.medium_lower.w)), 1, most) : 0;
+    int all_ = points * points * points;
+    float weights = 0.0;
+    for (int i = 0; i < all_; ++i) {
+        vec3 within = vec3(i % points, i / points % points, i / (points * points)) + 0.5;
+        vec3 q = p + (within / float(points) - 0.5) * side;
+        if (!in_box(q, frame.medium_lower.xyz, frame.medium_upper.xyz))
+            continue;
+        vec3 uvw = medium_coordinate(q);
+        vec4 scatter = textureLod(medium_scatter, uvw, 0.0);
+        float weight = luminance(scatter.rgb);
+        m.sigma_s += scatter.rgb;
+        m.sigma_s_scaled += scatter.rgb * (1.0 - forward_share(scatter.a));
+        m.sigma_t += textureLod(medium_extinct, uvw, 0.0).rgb;
+        m.g += scatter.a * weight;
+        weights += weight;
+        if (frame.medium_upper.w != 0.0)
+            m.emission += textureLod(medium_emission, uvw, 0.0).rgb;
+    }
+    float share = 1.0 / float(max(all_, 1));
+    m.sigma_s *= share;
+    m.sigma_s_scaled *= share;
+    m.sigma_t *= share;
+    m.emission *= share;
+    m.g /= max(weights, 1e-30);
+    return m;
 }
 
 // Distance along the direction to the end of an empty brick, 0 where the brick has something.

@@ -147,6 +147,8 @@ typedef struct mat4 { float m[16]; } mat4;
 #define MOMENTS 16
 #define MIXED 5
 #define HISTORY 4
+/* In a reflective map that looks out of the lattice: a surface that is still in it. */
+#define REFLECTS_WITHIN 0.5
 /* Below this optical depth of a cell light does not diffuse. */
 #define THINNEST 0.25
 
@@ -219,7 +221,8 @@ struct gpu_draw {
     mat4 clip_from_world;
     vec4 clip;           /* near, far along the view; z: 1 orthographic; w: for links, the share of the
                             brightest emission that a unit is */
-    vec4 eye;            /* camera position, or the direction it looks along; w: 0 direction */
+    vec4 eye;            /* camera position, or the direction it looks along; w: 0 direction. Of a
+                            reflective map that looks out of the field's lattice: that way; w: 1 */
     uvec4 info;          /* x: seed of the alpha test; y: number of a link */
 };
 
@@ -274,7 +277,9 @@ typedef struct gpu_field gpu_field;
 /* A direction that DOM carries light along. */
 struct gpu_ordinate {
     vec4 direction;      /* w: weight, sr */
-    vec4 world;          /* mean radiance of the world around where light comes from along it */
+    vec4 world;          /* mean radiance that comes into the lattice along it: of the world around
+                            there, and of surfaces beyond the lattice */
+    vec4 sky;            /* of the world alone */
     vec4 harmonics[4];   /* of the direction */
     uvec4 links_in;      /* bits of the four links by which light along it comes into a cell, */
     uvec4 links_out;     /* and goes on; as lib/cuts.glsl numbers them */

@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* What surrounds the lattice: the world's light along an ordinate, or that of surfaces beyond the
+ * lattice's sides which hide it, such as a wide ground. */
+#include "base/result.h"
+#include "scene/light_view.h"
+#include "transport/dom.h"
+
+#define SIDE 16 /* texels of a map */
+
+struct maps {
+    struct texture colors[3], depth; /* position, normal, reflectance */
+    GLuint framebuffer;
+};
+
+bool dom_has_surroundings(const struct lpv_work *cells)
+{
+    const struct geometry *geometry = cells->input->geometry;
+    const float *lower = &cells->field->lower.x;
+    const int *dims = &cells->field->dims.x;
+    if (!(geometry->lower[0] <= geometry->upper[0]))
+        return false;
+    for (int i = 0; i < 3; ++i)
+        if (geometry->lower[i] < lower[i] - lower[3] ||
+            geometry->upper[i] > lower[i] + (float)(dims[i] + 1) * lower[3])
+            return true;
+    return false;
+}
+
+static brume_result make_maps(struct memory *memory, struct maps *maps)
+{
+    static const GLenum formats[] = {GL_RGBA32F, GL_RGBA16F, GL_RGBA16F};
+    static const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
+                                     GL_COLOR_ATTACHMENT2};
+    glCreateFramebuffers(1, &maps->framebuffer);
+    for (int i = 0; i < 3; ++i) {
+        TRY(texture_init(memory, &maps->colors[i], FOR_TRANSPORT, GL_TEXTURE_2D, formats[i], SIDE,
+                         SIDE, 1, 1, "surroundings"));
+        glNamedFramebufferTexture(maps->framebuffer, targets[i], maps->colors[i].id, 0);
+    }
+    TRY(texture_init(memory, &maps->depth, FOR_TRANSPORT, GL_TEXTURE_2D, GL_DEPTH_COMPONENT32F,
+                     SIDE, SIDE, 1, 1, "surroundings' depths"));
+    glNamedFramebufferTexture(maps->framebuffer, GL_DEPTH_ATTACHMENT, maps->depth.id, 0);
+    glNamedFramebufferDrawBuffers(maps->framebuffer, 3, targets);
+    return BRUME_OK;
+}
+
+static void finish_maps(struct memory *memory, struct maps *maps)
+{
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glDeleteFramebuffers(1, &maps->framebuffer);
+    for (int i = 0; i < 3; ++i)
+        texture_finish(memory, &maps->colors[i]);
+    texture_finish(memory, &maps->depth);
+}
+
+/* Out of the lattice, against the ordinate. */
+static brume_result draw(struct lpv_work *cells, const struct maps *maps, const vec4 *direction)
+{
+    static const float nothing[4], far_;
+    const struct transport_input *input = cells->input;
+    float lower[3], upper[3];
+    struct gpu_shadow_view view;
+    for (int i = 0; i < 3; ++i) {
+        lower[i] = (&cells->field->lower.x)[i];
+        upper[i] = lower[i] + (float)(&cells->field->dims.x)[i] * cells->field->lower.w;
+    }
+    light_view_distant(input->geometry->lower, input->geometry->upper, lower, upper, direction,
+                       SIDE, &view);
+    glBindFramebuffer(GL_FRAMEBUFFER, maps->framebuffer);
+    glViewport(0, 0, SIDE, SIDE);
+    glClearNamedFramebufferfv(maps->framebuffer, GL_COLOR, 0, nothing);
+    glClearNamedFramebufferfv(maps->framebuffer, GL_DEPTH, 0, &far_);
+    const struct gpu_draw stage = {.clip_from_world = view.clip_from_world,
+                                   .eye = {-direction->x, -direction->y, -direction->z, 1.0f}};
+    return geometry_draw(input->gpu, input->geometry, &stage, BRUME_VISIBLE_SHADOW,
+                         GEOMETRY_REFLECT);
+}
+
+static brume_result look_out(struct lpv_work *cells, const struct maps *maps,
+                             const struct buffer *ordinates, const vec4 *directions, int count)
+{
+    const struct program *program;
+    TRY(program_compute(&cells->input->gpu->programs, "dom_surroundings", &program));
+    for (int k = 0; k < count; ++k) {
+        TRY(opv_go_on(&cells->passes, 0.0f));
+        TRY(draw(cells, maps, &directions[k]));
+        for (int i = 0; i < 3; ++i)
+            glBindTextureUnit((GLuint)(SLOT_RSM + i), maps->colors[i].id);
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ORDINATES, ordinates->id);
+        glProgramUniform2i(program->id, 0, k, SIDE);
+        program_dispatch(program, GROUP_REST, 1, 1);
+    }
+    glMemoryBarrier(GL_UNIFORM_BARRIER_BIT);
+    return BRUME_OK;
+}
+
+brume_result dom_look_out(struct lpv_work *cells, const struct buffer *ordinates,
+                          const vec4 *directions, int count)
+{
+    struct memory *memory = &cells->input->gpu->memory;
+    struct maps maps = {0};
+    brume_result result = make_maps(memory, &maps);
+    if (result == BRUME_OK)
+        result = look_out(cells, &maps, ordinates, directions, count);
+    finish_maps(memory, &maps);
+    return result;
+}

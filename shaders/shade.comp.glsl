@@ -125,11 +125,14 @@ vec3 world_specular(surface s, vec3 p, ivec2 pixel, float within)
 // Light that was scattered or reflected before. What mirrors show of it is as soft as the lattice.
 vec3 field_surface(surface s, vec3 p)
 {
-    if (!field_reaches(p + s.normal * (0.5 * frame.fields[0].lower.w)))
+    vec3 before = s.normal * (0.5 * frame.fields[0].lower.w);
+    float left;
+    vec3 q = field_leaves(p + before, left) - before;
+    if (left <= 0.0)
         return vec3(0.0);
-    field_light light = field_at(p, s.normal, frame.field.x - 1);
-    return s.diffuse * field_irradiance(light, s.normal) / PI +
-           s.specular * field_radiance(light, reflect(-s.view, s.normal));
+    field_light light = field_at(q, s.normal, frame.field.x - 1);
+    return left * (s.diffuse * field_irradiance(light, s.normal) / PI +
+                   s.specular * field_radiance(light, reflect(-s.view, s.normal)));
 }
 
 void main()

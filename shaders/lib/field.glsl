@@ -123,6 +123,27 @@ bool field_reaches(vec3 p)
     return all(greaterThan(at, vec3(0.0))) && all(lessThan(at, vec3(field.dims.xyz)));
 }
 
+// Beyond it light goes on from where it left the lattice: the point there, and how much of it is left.
+// Light of something in the lattice's middle, on a ground, falls with the third power of the distance.
+// Nothing is left where a surface stands between.
+vec3 field_leaves(vec3 p, out float left)
+{
+    gpu_field field = frame.fields[0];
+    vec3 half_ = 0.5 * vec3(field.dims.xyz) * field.lower.w, middle = field.lower.xyz + half_;
+    vec3 room = half_ - 0.5 * field.lower.w;
+    vec3 q = middle + clamp(p - middle, -room, room);
+    vec3 off = p - q;
+    ivec3 beyond = ivec3(sign(off)) * ivec3(greaterThan(abs(off), vec3(0.5 * field.lower.w)));
+    left = 1.0;
+    if (beyond == ivec3(0))
+        return p;
+    ivec3 cell = clamp(ivec3((q - field.lower.xyz) / field.lower.w), ivec3(0), field.dims.xyz - 1);
+    vec2 sides = texelFetch(field_lattice, texel_of(field, cell, 3), 0).xy;
+    uint cuts = uint(sides.x) | uint(sides.y) << 13;
+    left = is_cut(cuts, beyond) ? 0.0 : pow(length(q - middle) / length(p - middle), 3.0);
+    return q;
+}
+
 // Of the light at a point, the share that a lattice within another tells: it gives way to that one in
 // its outermost cells, so that no seam shows.
 const float GIVES_WAY = 4.0; // cells

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A step towards what an iteration has yet to find of the fluence, where light diffuses: the flux that
-// leaves a cell and what it absorbs come from what the iteration's change scatters there (Alcouffe,
+// leaves a cell and what it absorbs come from what the iteration's change scatters there, and from what
+// surfaces' change sends (Alcouffe,
 // "Diffusion Synthetic Acceleration Methods for the Diamond-Differenced Discrete-Ordinates Equations",
 // Nucl. Sci. Eng. 1977). Jacobi's iteration with Chebyshev's weights (Golub and Varga, Numer. Math. 1961).
 #version 450 core
@@ -22,15 +23,13 @@ void main()
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
     if (!in_level(cell) || cell.z >= stage.slab.w)
         return;
-    uint cuts = texelFetch(cell_cuts, cell, 0).r;
-    vec3 tau = texelFetch(cell_depths, cell, 0).rgb;
+    diffusing c = diffusing_cell(cell, residual);
     vec3 depth = texelFetch(cell_extinct, cell, 0).rgb * level.lower.w;
     vec3 albedo = texelFetch(cell_albedo, cell, 0).rgb;
-    vec3 reflectance = texelFetch(cell_reflectance, cell, 0).rgb;
     vec3 comes = albedo * depth * texelFetch(residual, cell, 0).rgb, goes = (1.0 - albedo) * depth;
     for (int i = 0; i < 6; ++i) {
         vec3 from;
-        goes += passes_side(cell, i, tau, cuts, reflectance, from);
+        goes += passes_side(cell, i, c, from);
         comes += from;
     }
     vec3 own = texelFetch(missing, cell, 0).rgb;

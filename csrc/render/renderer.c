@@ -167,12 +167,14 @@ static void set_world(struct run *run)
 /* Of all light, what the settings want. */
 static void set_paths(struct run *run)
 {
-    const uint32_t paths = run->request->settings.light_paths;
+    const brume_settings *settings = &run->request->settings;
+    const uint32_t paths =
+        settings->method == BRUME_METHOD_DOM ? BRUME_PATHS_ALL : settings->light_paths;
     const int all = paths == BRUME_PATHS_ALL, sum = paths == BRUME_PATHS_SUM;
     run->renderer->frame.paths = (ivec4){
         .x = all || sum || paths == BRUME_PATHS_SINGLE,
         .y = all || sum || paths == BRUME_PATHS_REFLECTED_MARCHED,
-        .z = run->request->settings.method == BRUME_METHOD_DOM,
+        .z = settings->method == BRUME_METHOD_DOM,
     };
 }
 

@@ -13,18 +13,20 @@
 #include <string.h>
 
 #define MOST_ITERATIONS 100
-/* Iterations also end when for so many no less was left to find: rounding is all that is left. */
+/* Iterations also end when for so many no less was left to find, and it is less than so many times
+ * what may be: rounding is all that is left. */
 #define STALLED 4
+#define NEARLY 10.0
 
 struct dom_work {
     struct lpv_work cells;         /* the lattice: what it is filled with, and its surfaces */
     const struct dom_work *around; /* the lattice around, whose light is known; or NULL */
     int number;                    /* of the lattice, from outside */
-    bool surrounded;               /* the outermost: whether surfaces stand beyond its sides */
+    bool surrounded;               /* whether surfaces stand beyond the outermost one's sides */
     bool has_within;               /* whether another stands in it */
     int count, axes[3];            /* ordinates: all, and by their major axes */
     vec4 directions[MOST_ORDINATES];
-    int across;                    /* tiles of theirs along z */
+    int across; /* tiles of theirs along z */
     struct buffer ordinates, dots;
     struct texture sources, means, hits; /* by ordinates */
     struct texture world_means;          /* the same of the world's own light, for one within */
@@ -47,6 +49,13 @@ static brume_result lattice_texture(struct dom_work *work, struct texture *textu
     return texture_init(&work->cells.input->gpu->memory, texture, FOR_TRANSPORT, GL_TEXTURE_3D,
                         format, texture_side(across * dims.x), texture_side(up * dims.y),
                         texture_side(deep * dims.z), 1, label);
+}
+
+static int longest_side(const struct dom_work *work)
+{
+    const ivec4 dims = work->cells.field->dims;
+    const int most = dims.x > dims.y ? dims.x : dims.y;
+    return most > dims.z ? most : dims.z;
 }
 
 static void clear(const struct texture *texture)
@@ -120,8 +129,7 @@ static brume_result make_ordinates(struct dom_work *work)
     if (work->has_within && has_world(work))
         TRY(lattice_texture(work, &work->world_means, GL_RGBA16F, 1, columns, work->across,
                             "the world's radiance"));
-    int side = dims.x > dims.y ? dims.x : dims.y;
-    side = side > dims.z ? side : dims.z;
+    const int side = longest_side(work);
     for (int i = 0; i < 2; ++i)
         TRY(texture_init(&gpu->memory, &work->slices[i], FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
                          texture_side(side), texture_side(side), texture_side(work->count), 1,
@@ -181,13 +189,6 @@ static void finish(struct dom_work *work)
 static void image(int slot, const struct texture *texture)
 {
     glBindImageTexture((GLuint)slot, texture->id, 0, GL_TRUE, 0, GL_WRITE_ONLY, texture->format);
-}
-
-static int longest_side(const struct dom_work *work)
-{
-    const ivec4 dims = work->cells.field->dims;
-    const int most = dims.x > dims.y ? dims.x : dims.y;
-    return most > dims.z ? most : dims.z;
 }
 
 static void bind_lattice(const struct dom_work *work)
@@ -319,6 +320,7 @@ static void bind_diffusion(const struct dom_work *work, const struct texture *mi
     glBindTextureUnit(SLOT_CELL_DEPTHS, work->depths.id);
     glBindTextureUnit(SLOT_WALLS, work->cells.cells[2].id);
     glBindTextureUnit(SLOT_MISSING, missing->id);
+    glBindTextureUnit(SLOT_MOMENTS, work->residuals[work->slots[work->kept - 1]].id);
 }
 
 /* Adds what the newest result has yet to find where light diffuses, found in as many steps as the
@@ -338,7 +340,6 @@ static brume_result diffuse(struct dom_work *work)
     for (int step = 0; step < most; ++step) {
         bind_diffusion(work, &work->missing[(step + 1) % 3]);
         glBindTextureUnit(SLOT_MISSING + 1, work->missing[step % 3].id);
-        glBindTextureUnit(SLOT_MOMENTS, work->residuals[newest].id);
         image(SLOT_OUTPUT, &work->missing[(step + 2) % 3]);
         glProgramUniform2f(program->id, 0, (float)inertia, (float)forward);
         TRY(over_field(work, "dom_diffusion", (ivec4){0}));
@@ -474,7 +475,8 @@ static brume_result solve(struct dom_work *work)
             best = i;
         }
         /* In the first one surfaces only learn what they have to send, unless they know. */
-        if (wanted <= 0 && (i > 0 || work->warm) && (change < limit || i - best >= STALLED))
+        if (wanted <= 0 && (i > 0 || work->warm) &&
+            (change < limit || (least < NEARLY * limit && i - best >= STALLED)))
             break;
     }
     return BRUME_OK;

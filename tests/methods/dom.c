@@ -309,6 +309,48 @@ static void light_between_walls(void **state)
     }
 }
 
+/* In a closed white box all of a lamp's power ends in the fog, however little that absorbs: the
+ * light crosses the box hundreds of times. */
+static void white_room(void **state)
+{
+    (void)state;
+    static const struct {
+        float sigma_s, sigma_a;
+    } cases[] = {{0.45f, 0.05f}, {1.98f, 0.02f}, {7.92f, 0.08f}};
+    static const double lamp[3] = {0.31, 0.17, -0.23};
+    const brume_settings settings = settings_for(16);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        const float s = cases[i].sigma_s, a = cases[i].sigma_a;
+        const struct coefficients fog = {.sigma_s = {s, s, s}, .sigma_a = {a, a, a}};
+        const double sigma_t = (double)s + (double)a;
+        brume_scene *scene = empty();
+        brume_stats stats;
+        add_box(scene, 1, 1.0f, 1.0f);
+        add_fog_cube(scene, 2, origin, 1.0f, &fog);
+        add_lamp(scene, 3, (float[3]){(float)lamp[0], (float)lamp[1], (float)lamp[2]}, 1.0f);
+        struct field field = field_of(scene, &settings, &stats);
+        double fluences = 0.0; /* over the volume */
+        for (int z = 0; z < 16; ++z)
+            for (int y = 0; y < 16; ++y)
+                for (int x = 0; x < 16; ++x)
+                    fluences += 8.0 / 4096.0 * fluence(&field, (const int[3]){x, y, z}, 0);
+        uint64_t lots = 88172645463325252u;
+        for (int k = 0; k < PHOTONS / 4; ++k) { /* and what comes straight from the lamp */
+            double d[3] = {0, 0, 1}, way;
+            scatter(d, 0.0, &lots);
+            wall_ahead(lamp, d, 1.0, &way);
+            fluences += (1.0 - exp(-sigma_t * way)) / sigma_t / (PHOTONS / 4);
+        }
+        const double absorbed = (double)a * fluences;
+        print_message("white room, sigma_s %g sigma_a %g, %u iterations: %.4f of 1 W\n", (double)s,
+                      (double)a, stats.iterations, absorbed);
+        assert_close(absorbed, 1.0, 0.03);
+        assert_true(stats.iterations <= 15);
+        free(field.texels);
+        brume_scene_destroy(scene);
+    }
+}
+
 /* A closed box that glows and reflects: everywhere in it is the same light. */
 static void glowing_walls(void **state)
 {
@@ -455,15 +497,11 @@ static void nothing_odd_comes_of_chance(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(quadratures),
-        cmocka_unit_test(furnaces),
-        cmocka_unit_test(few_iterations),
-        cmocka_unit_test(cube),
-        cmocka_unit_test(light_between_walls),
-        cmocka_unit_test(glowing_walls),
-        cmocka_unit_test(glowing_thing),
-        cmocka_unit_test(nothing_odd_comes_out),
-        cmocka_unit_test(nothing_odd_comes_of_chance),
+        cmocka_unit_test(quadratures),           cmocka_unit_test(furnaces),
+        cmocka_unit_test(few_iterations),        cmocka_unit_test(cube),
+        cmocka_unit_test(light_between_walls),   cmocka_unit_test(white_room),
+        cmocka_unit_test(glowing_walls),         cmocka_unit_test(glowing_thing),
+        cmocka_unit_test(nothing_odd_comes_out), cmocka_unit_test(nothing_odd_comes_of_chance),
     };
     const struct CMUnitTest long_tests[] = {
         cmocka_unit_test(fine_cube),

@@ -24,12 +24,6 @@ layout(binding = SLOT_MOMENTS) uniform sampler3D world_moments;
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D moments_image;
 layout(binding = SLOT_OUTPUT + 1, rgba16f) writeonly uniform image3D wall_image;
 
-ivec3 texel_before(ivec3 cell, int moment)
-{
-    return cell + ivec3(moment % MOMENT_SIDE * before.dims.x, moment / MOMENT_SIDE * before.dims.y,
-                        before.dims.w);
-}
-
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
@@ -39,21 +33,22 @@ void main()
     ivec3 nearest = ivec3(floor(at)), low = ivec3(floor(at - 0.5));
     if (!in_field(before, nearest))
         return;
+    ivec3 stands = ivec3(0, 0, before.dims.w); // one above the other
     vec3 f = at - 0.5 - vec3(low), sums[MOMENTS];
     for (int m = 0; m < MOMENTS; ++m)
         sums[m] = vec3(0.0);
     for (int corner = 0; corner < 8; ++corner) {
         ivec3 side = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
         vec3 each = mix(1.0 - f, f, vec3(side));
-        ivec3 from = clamp(low + side, ivec3(0), before.dims.xyz - 1);
+        ivec3 from = clamp(low + side, ivec3(0), before.dims.xyz - 1) + stands;
         for (int m = 0; m < MOMENTS; ++m)
-            sums[m] += each.x * each.y * each.z * texelFetch(light, texel_before(from, m), 0).rgb;
+            sums[m] += each.x * each.y * each.z * texelFetch(light, moment_texel_of(before, from, m), 0).rgb;
     }
     for (int m = 0; m < MOMENTS; ++m) {
         if (stage.offset.x != 0)
             sums[m] -= texelFetch(world_moments, moment_texel(cell, m), 0).rgb;
         imageStore(moments_image, moment_texel(cell, m), fit(sums[m], 0.0));
     }
-    vec3 wall = texelFetch(walls, nearest + ivec3(0, 0, before.dims.w), 0).rgb;
+    vec3 wall = texelFetch(walls, nearest + stands, 0).rgb;
     imageStore(wall_image, cell, fit(texelFetch(cell_cuts, cell, 0).r != 0u ? wall : vec3(0.0), 0.0));
 }

@@ -106,6 +106,35 @@ static double fluence_at(const struct field *field, const float p[3], int color)
     return sum;
 }
 
+/* Over all cells of the level: the mean fluence of a colour; and how far two fields of one lattice are
+ * apart in the first colours, sum of absolute differences over sum. */
+static double mean_fluence(const struct field *field, int color)
+{
+    const int *dims = dims_of(field);
+    double sum = 0.0;
+    int cell[3];
+    for (cell[2] = 0; cell[2] < dims[2]; ++cell[2])
+        for (cell[1] = 0; cell[1] < dims[1]; ++cell[1])
+            for (cell[0] = 0; cell[0] < dims[0]; ++cell[0])
+                sum += fluence(field, cell, color);
+    return sum / ((double)dims[0] * dims[1] * dims[2]);
+}
+
+static double fields_apart(const struct field *field, const struct field *truth, int colors)
+{
+    const int *dims = dims_of(truth);
+    double off = 0.0, all = 0.0;
+    int cell[3];
+    for (cell[2] = 0; cell[2] < dims[2]; ++cell[2])
+        for (cell[1] = 0; cell[1] < dims[1]; ++cell[1])
+            for (cell[0] = 0; cell[0] < dims[0]; ++cell[0])
+                for (int color = 0; color < colors; ++color) {
+                    off += fabs(fluence(field, cell, color) - fluence(truth, cell, color));
+                    all += fluence(truth, cell, color);
+                }
+    return off / all;
+}
+
 static void assert_sound(const struct field *field)
 {
     int cell[3];

@@ -188,8 +188,7 @@ uint64_t lattice_field_bytes(const struct renderer *renderer, const brume_settin
     uint64_t cells = 0, slices = 0;
     for (int i = 0; i < frame->field.x; ++i) {
         const ivec4 dims = frame->fields[i].dims;
-        const uint64_t side = (uint64_t)(dims.x > dims.y ? (dims.x > dims.z ? dims.x : dims.z)
-                                                         : (dims.y > dims.z ? dims.y : dims.z));
+        const uint64_t side = (uint64_t)dom_longest_side(&dims);
         if (settings->method == BRUME_METHOD_DOM)
             slices += side * side * (uint64_t)settings->ordinates * DOM_SLICE_BYTES;
         cells += (uint64_t)dims.x * (uint64_t)dims.y * (uint64_t)dims.z;

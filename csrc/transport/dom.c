@@ -51,11 +51,10 @@ static brume_result lattice_texture(struct dom_work *work, struct texture *textu
                         texture_side(deep * dims.z), 1, label);
 }
 
-static int longest_side(const struct dom_work *work)
+int dom_longest_side(const ivec4 *dims)
 {
-    const ivec4 dims = work->cells.field->dims;
-    const int most = dims.x > dims.y ? dims.x : dims.y;
-    return most > dims.z ? most : dims.z;
+    const int most = dims->x > dims->y ? dims->x : dims->y;
+    return most > dims->z ? most : dims->z;
 }
 
 static void clear(const struct texture *texture)
@@ -129,7 +128,7 @@ static brume_result make_ordinates(struct dom_work *work)
     if (work->has_within && has_world(work))
         TRY(lattice_texture(work, &work->world_means, GL_RGBA16F, 1, columns, work->across,
                             "the world's radiance"));
-    const int side = longest_side(work);
+    const int side = dom_longest_side(&dims);
     for (int i = 0; i < 2; ++i)
         TRY(texture_init(&gpu->memory, &work->slices[i], FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
                          texture_side(side), texture_side(side), texture_side(work->count), 1,
@@ -259,10 +258,10 @@ static brume_result sweep(struct dom_work *work, bool world)
     const struct dom_work *around = work->around;
     if (around)
         glBindTextureUnit(SLOT_MEANS_AROUND, world ? around->world_means.id : around->means.id);
-    glProgramUniform2i(program->id, 1, work->number - 1, around ? around->across : 1);
+    glProgramUniform2i(program->id, 1, around ? around->number : -1, around ? around->across : 1);
     image(SLOT_OUTPUT, &work->means);
     image(SLOT_OUTPUT + 2, &work->hits);
-    const int most = longest_side(work);
+    const int most = dom_longest_side(&work->cells.field->dims);
     for (int slice = 0; slice < most; ++slice) {
         TRY(opv_go_on(&work->cells.passes, 0.0f));
         glBindTextureUnit(SLOT_SLICE, work->slices[slice % 2].id);
@@ -329,7 +328,7 @@ static brume_result diffuse(struct dom_work *work)
 {
     const struct program *program;
     const int newest = work->slots[work->kept - 1];
-    const int most = longest_side(work);
+    const int most = dom_longest_side(&work->cells.field->dims);
     /* Eigenvalues: of the longest mode that fits into the lattice, and of the shortest. */
     const double least = 4.0 / ((double)most * most), greatest = 2.0;
     const double middle = 0.5 * (greatest + least), half = 0.5 * (greatest - least);
@@ -518,13 +517,9 @@ static brume_result make_product(struct transport *transport, const struct trans
 {
     struct memory *memory = &input->gpu->memory;
     const struct gpu_frame *frame = input->frame;
-    int x = 0, y = 0, z = 0;
-    for (int i = 0; i < frame->field.x; ++i) {
-        const ivec4 dims = frame->fields[i].dims;
-        x = dims.x > x ? dims.x : x;
-        y = dims.y > y ? dims.y : y;
-        z = dims.w + dims.z;
-    }
+    int size[3];
+    lpv_product_size(frame, size);
+    const int x = size[0], y = size[1], z = size[2];
     TRY(lpv_make_product(&transport->field, input));
     TRY(texture_ensure(memory, &transport->light, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
                        texture_side(MOMENT_SIDE * x), texture_side(MOMENT_SIDE * y),
@@ -570,6 +565,7 @@ brume_result dom_run(struct transport *transport, const struct transport_input *
     transport_bind(transport); /* depths, as OPV has just found them */
     struct laps laps = {.sums_ms = input->stats->field_ms};
     struct dom_work works[FIELD_LEVELS] = {0};
+    const bool surrounded = dom_has_surroundings(input);
     for (int i = 0; i < levels; ++i)
         works[i] = (struct dom_work){
             .cells = {.input = input,
@@ -579,8 +575,7 @@ brume_result dom_run(struct transport *transport, const struct transport_input *
             .around = i ? &works[i - 1] : NULL,
             .number = i,
             .has_within = i + 1 < levels,
-            .surrounded = dom_has_surroundings(
-                &(struct lpv_work){.input = input, .field = &input->frame->fields[0]}),
+            .surrounded = surrounded,
             .count = input->settings->ordinates,
         };
     const brume_result result = find(works, levels, transport);

@@ -13,13 +13,16 @@
 #define DOM_AROUND_BYTES 8
 #define DOM_SLICE_BYTES 16 /* of a slice's cell, for each ordinate */
 
+/* Cells along the lattice's longest side. */
+int dom_longest_side(const ivec4 *dims);
+
 /* The ordinates of a quadrature with so many, 26, 48 or 96, sorted by their major axes: directions
  * and weights, sr. docs/methods/dom.md says what they integrate exactly. Returns how many have each
  * axis. */
 void dom_quadrature(int count, vec4 directions[MOST_ORDINATES], int axes[3]);
 
-/* Whether geometry reaches beyond the lattice. */
-bool dom_has_surroundings(const struct lpv_work *cells);
+/* Whether geometry reaches beyond the outermost lattice. */
+bool dom_has_surroundings(const struct transport_input *input);
 /* Puts what surfaces beyond the lattice send along each ordinate in the place of the world that they
  * hide; ordinates and lattice are there and bound. */
 brume_result dom_look_out(struct lpv_work *cells, const struct buffer *ordinates,

@@ -12,16 +12,17 @@ struct maps {
     GLuint framebuffer;
 };
 
-bool dom_has_surroundings(const struct lpv_work *cells)
+bool dom_has_surroundings(const struct transport_input *input)
 {
-    const struct geometry *geometry = cells->input->geometry;
-    const float *lower = &cells->field->lower.x;
-    const int *dims = &cells->field->dims.x;
+    const struct geometry *geometry = input->geometry;
+    const struct gpu_field *field = &input->frame->fields[0];
+    const float room = field->lower.w;
+    float lower[3], upper[3];
+    lpv_field_box(field, lower, upper);
     if (!(geometry->lower[0] <= geometry->upper[0]))
         return false;
     for (int i = 0; i < 3; ++i)
-        if (geometry->lower[i] < lower[i] - lower[3] ||
-            geometry->upper[i] > lower[i] + (float)(dims[i] + 1) * lower[3])
+        if (geometry->lower[i] < lower[i] - room || geometry->upper[i] > upper[i] + room)
             return true;
     return false;
 }
@@ -60,10 +61,7 @@ static brume_result draw(struct lpv_work *cells, const struct maps *maps, const 
     const struct transport_input *input = cells->input;
     float lower[3], upper[3];
     struct gpu_shadow_view view;
-    for (int i = 0; i < 3; ++i) {
-        lower[i] = (&cells->field->lower.x)[i];
-        upper[i] = lower[i] + (float)(&cells->field->dims.x)[i] * cells->field->lower.w;
-    }
+    lpv_field_box(cells->field, lower, upper);
     light_view_distant(input->geometry->lower, input->geometry->upper, lower, upper, direction,
                        SIDE, &view);
     glBindFramebuffer(GL_FRAMEBUFFER, maps->framebuffer);

@@ -309,16 +309,21 @@ static brume_result find(struct lpv_work *works, int levels)
     return BRUME_OK;
 }
 
-brume_result lpv_make_product(struct texture *product, const struct transport_input *input)
+void lpv_product_size(const struct gpu_frame *frame, int size[3])
 {
-    const struct gpu_frame *frame = input->frame;
-    int size[3] = {0};
+    size[0] = size[1] = size[2] = 0;
     for (int i = 0; i < frame->field.x; ++i) {
         const ivec4 dims = frame->fields[i].dims;
         size[0] = dims.x > size[0] ? dims.x : size[0];
         size[1] = dims.y > size[1] ? dims.y : size[1];
         size[2] = dims.w + dims.z;
     }
+}
+
+brume_result lpv_make_product(struct texture *product, const struct transport_input *input)
+{
+    int size[3];
+    lpv_product_size(input->frame, size);
     return texture_ensure(&input->gpu->memory, product, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA32F,
                           texture_side(4 * size[0]), texture_side(size[1]), texture_side(size[2]),
                           1, "field");

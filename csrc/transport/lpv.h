@@ -53,8 +53,12 @@ int lpv_tile_rows(const ivec4 *dims, int in_a_row);
 brume_result lpv_strew(struct lpv_work *work, const char *stem, GLuint target, const ivec4 *dims,
                        int in_a_row, int texels);
 
-/* The texture of all lattices' fields, one above the other. */
+/* The cells of all lattices, one above the other, and the texture of their fields. */
+void lpv_product_size(const struct gpu_frame *frame, int size[3]);
 brume_result lpv_make_product(struct texture *product, const struct transport_input *input);
+
+/* The corners of a lattice. */
+void lpv_field_box(const struct gpu_field *field, float lower[3], float upper[3]);
 
 /* Links that surfaces cut, and what these reflect, into work->links and walls. */
 brume_result lpv_cut_links(struct lpv_work *work);

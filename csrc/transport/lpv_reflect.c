@@ -144,7 +144,7 @@ static brume_result see_from_outside(struct lpv_work *work, struct maps *maps)
     return BRUME_OK;
 }
 
-static void field_box(const struct gpu_field *field, float lower[3], float upper[3])
+void lpv_field_box(const struct gpu_field *field, float lower[3], float upper[3])
 {
     const int *dims = &field->dims.x;
     for (int i = 0; i < 3; ++i) {
@@ -160,7 +160,7 @@ static brume_result distant(struct lpv_work *work, struct maps *maps, const vec4
     const struct transport_input *input = work->input;
     float lower[3], upper[3];
     struct gpu_shadow_view view;
-    field_box(work->field, lower, upper);
+    lpv_field_box(work->field, lower, upper);
     light_view_distant(input->geometry->lower, input->geometry->upper, lower, upper, towards,
                        what.w, &view);
     TRY(one_map(work, maps, &view, what, scale));

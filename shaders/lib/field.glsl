@@ -52,6 +52,13 @@ void add_cell(inout field_light light, gpu_field field, ivec3 cell, float weight
     }
 }
 
+// The links of a cell that surfaces cut.
+uint cuts_of(gpu_field field, ivec3 cell)
+{
+    vec2 sides = texelFetch(field_lattice, texel_of(field, cell, 3), 0).xy;
+    return uint(sides.x) | uint(sides.y) << 13;
+}
+
 // The eight cells around a point.
 struct cells_between
 {
@@ -69,8 +76,7 @@ cells_between cells_around(gpu_field field, vec3 p)
     cells.low = ivec3(floor(at));
     cells.f = at - vec3(cells.low);
     cells.home = home_of(field, cells.low, cells.f, cells.last);
-    vec2 sides = texelFetch(field_lattice, texel_of(field, cells.home, 3), 0).xy;
-    cells.cuts = uint(sides.x) | uint(sides.y) << 13;
+    cells.cuts = cuts_of(field, cells.home);
     return cells;
 }
 
@@ -138,9 +144,7 @@ vec3 field_leaves(vec3 p, out float left)
     if (beyond == ivec3(0))
         return p;
     ivec3 cell = clamp(ivec3((q - field.lower.xyz) / field.lower.w), ivec3(0), field.dims.xyz - 1);
-    vec2 sides = texelFetch(field_lattice, texel_of(field, cell, 3), 0).xy;
-    uint cuts = uint(sides.x) | uint(sides.y) << 13;
-    left = is_cut(cuts, beyond) ? 0.0 : pow(length(q - middle) / length(p - middle), 3.0);
+    left = is_cut(cuts_of(field, cell), beyond) ? 0.0 : pow(length(q - middle) / length(p - middle), 3.0);
     return q;
 }
 

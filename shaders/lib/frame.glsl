@@ -22,6 +22,13 @@ float pixel_random(ivec2 pixel, uint stream)
     return fract(start + float(frame.size.z) * 0.618033988749895);
 }
 
+// The place of one of so many points along each side of a cube, of 1.
+vec3 point_in_cube(int number, int points)
+{
+    ivec3 at = ivec3(number % points, number / points % points, number / (points * points));
+    return (vec3(at) + 0.5) / float(points);
+}
+
 struct view_ray
 {
     vec3 origin;

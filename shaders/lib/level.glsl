@@ -23,8 +23,7 @@ int points_in_cell(int in_all, int most)
 // The place of one of them, of so many along a side.
 vec3 point_in_cell(ivec3 cell, int number, int points)
 {
-    vec3 within = vec3(number % points, number / points % points, number / (points * points)) + 0.5;
-    return level.lower.xyz + (vec3(cell) + within / float(points)) * level.lower.w;
+    return level.lower.xyz + (vec3(cell) + point_in_cube(number, points)) * level.lower.w;
 }
 
 // Where a cell stands in a picture of a lattice with its layers as tiles, so many in a row.

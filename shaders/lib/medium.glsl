@@ -39,8 +39,7 @@ medium_mean mean_of_medium(vec3 p, float side, int most)
     int all_ = points * points * points;
     float weights = 0.0;
     for (int i = 0; i < all_; ++i) {
-        vec3 within = vec3(i % points, i / points % points, i / (points * points)) + 0.5;
-        vec3 q = p + (within / float(points) - 0.5) * side;
+        vec3 q = p + (point_in_cube(i, points) - 0.5) * side;
         if (!in_box(q, frame.medium_lower.xyz, frame.medium_upper.xyz))
             continue;
         vec3 uvw = medium_coordinate(q);

@@ -17,9 +17,14 @@ ivec3 ordinate_texel(ivec3 cell, int number)
                       ivec3(0, level.dims.yz);
 }
 
+ivec3 moment_texel_of(gpu_field field, ivec3 cell, int moment)
+{
+    return cell + ivec3(moment % MOMENT_SIDE, moment / MOMENT_SIDE, 0) * ivec3(field.dims.xy, 0);
+}
+
 ivec3 moment_texel(ivec3 cell, int moment)
 {
-    return cell + ivec3(moment % MOMENT_SIDE, moment / MOMENT_SIDE, 0) * ivec3(level.dims.xy, 0);
+    return moment_texel_of(level, cell, moment);
 }
 
 // A texel of one lattice where all stand one above the other.

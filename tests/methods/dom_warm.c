@@ -35,20 +35,6 @@ static void light_up(brume_scene *scene, float x)
     add_lamp(scene, 3, (float[3]){x, 0.3f, 0.7f}, 10.0f);
 }
 
-static double apart(const struct field *a, const struct field *b)
-{
-    double off = 0.0, all = 0.0;
-    int cell[3];
-    for (cell[2] = 0; cell[2] < CELLS; ++cell[2])
-        for (cell[1] = 0; cell[1] < CELLS; ++cell[1])
-            for (cell[0] = 0; cell[0] < CELLS; ++cell[0])
-                for (int color = 0; color < 3; ++color) {
-                    off += fabs(fluence(a, cell, color) - fluence(b, cell, color));
-                    all += fluence(b, cell, color);
-                }
-    return off / all;
-}
-
 /* A lamp that moves a little, as far as it takes and roughly, and more cells than before. */
 static void begins_with_the_last(void **state)
 {
@@ -79,14 +65,15 @@ static void begins_with_the_last(void **state)
     brume_scene_destroy(scene);
     print_message("iterations: cold %u, a lamp moved %u; to 3 %% %u; from fewer cells %u; "
                   "%.3f and %.3f %% off, the move %.2f %%\n",
-                  all, after_a_move, roughly, from_fewer_cells, 100.0 * apart(&moved, &truth),
-                  100.0 * apart(&finer, &truth), 100.0 * apart(&fresh, &truth));
+                  all, after_a_move, roughly, from_fewer_cells,
+                  100.0 * fields_apart(&moved, &truth, 3), 100.0 * fields_apart(&finer, &truth, 3),
+                  100.0 * fields_apart(&fresh, &truth, 3));
     assert_true(after_a_move < all);
     assert_true(roughly <= 2);
     assert_true(from_fewer_cells < all);
-    assert_true(apart(&moved, &truth) < 0.002);
-    assert_true(apart(&finer, &truth) < 0.002);
-    assert_true(apart(&fresh, &truth) > 0.005); /* or there was nothing to find */
+    assert_true(fields_apart(&moved, &truth, 3) < 0.002);
+    assert_true(fields_apart(&finer, &truth, 3) < 0.002);
+    assert_true(fields_apart(&fresh, &truth, 3) > 0.005); /* or there was nothing to find */
     free(fresh.texels);
     free(moved.texels);
     free(finer.texels);
@@ -106,7 +93,7 @@ static void cold_is_as_fresh(void **state)
     light_up(scene, -0.46f);
     free(field_of(scene, &warm, NULL).texels);
     struct field again = field_of(scene, &cold, NULL);
-    assert_true(apart(&again, &fresh) == 0.0);
+    assert_true(fields_apart(&again, &fresh, 3) == 0.0);
     free(fresh.texels);
     free(again.texels);
     brume_scene_destroy(scene);

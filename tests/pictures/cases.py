@@ -22,7 +22,6 @@ class Case:
     cycles_samples: int     # per seed; a reference is the mean of two seeds
     zoom: float = 1.0       # multiplies the lens, so that the subject fills the square
     size: int = 128         # pixels a side
-    samples: int = 0        # Brume's; 0: 64, with all bounces 16, which blocks cannot tell apart
     step_rate: float = 1.0  # Cycles' volume step, in voxels
     change: str = ''        # a function of changes.py that sets scene or camera up
     # (name, pass index, tolerance): objects that are measured by themselves
@@ -36,8 +35,9 @@ class Case:
     medium_only: bool = False
 
     @property
-    def pixel_samples(self):
-        return self.samples or (64 if self.method == 'OPV' else 16)
+    def samples(self):
+        """Brume's a pixel. With all bounces blocks cannot tell more from fewer."""
+        return 64 if self.method == 'OPV' else 16
 
     @property
     def name(self):

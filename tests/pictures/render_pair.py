@@ -126,7 +126,7 @@ def main(arguments):
         elif options.engine == 'BRUME':
             if options.preset:
                 scene.brume.preset = options.preset
-            scene.brume.samples = case.pixel_samples
+            scene.brume.samples = case.samples
             scene.brume.method = case.method
             if case.world_samples:
                 scene.brume.world_samples = case.world_samples

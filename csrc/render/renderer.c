@@ -138,6 +138,16 @@ static uint32_t spread_step(uint32_t count)
     }
 }
 
+static brume_result update_world_map(struct run *run)
+{
+    const struct snapshot *snapshot = run->request->snapshot;
+    const struct entry *image =
+        table_find(&snapshot->tables[BRUME_KIND_IMAGE], snapshot->world.image);
+    return world_map_update(&run->renderer->world_map,
+                            image ? (struct image_block *)image->block : NULL,
+                            image ? 2 * image->revision : 1);
+}
+
 static void set_world(struct run *run)
 {
     struct renderer *renderer = run->renderer;
@@ -192,8 +202,9 @@ static brume_result work_shadow(struct run *run)
     struct renderer *renderer = run->renderer;
     const struct render_request *request = run->request;
     job_report(request->control, BRUME_STAGE_SHADOW, 0.02f);
-    TRY(shadows_layout(&renderer->shadows, request->snapshot, &request->settings,
-                       &renderer->geometry, &renderer->shadow_plan, request->control));
+    TRY(shadows_layout(&renderer->shadows, request->snapshot, &renderer->world_map,
+                       &request->settings, &renderer->geometry, &renderer->shadow_plan,
+                       request->control));
     TRY(shadows_upload(run->gpu, &renderer->shadows));
     return shadows_render(run->gpu, &renderer->shadows, &renderer->geometry,
                           renderer->stages[BRUME_STAGE_UPLOAD].revision, request->control,
@@ -224,6 +235,8 @@ static brume_result work_transport(struct run *run)
         .light_count = renderer->shadows.light_count,
         .medium_revision = renderer->stages[BRUME_STAGE_MEDIUM].revision,
         .world_signature = renderer->shadows.world_signature,
+        .world = &request->snapshot->world,
+        .world_map = &renderer->world_map,
         .world_first = renderer->shadows.world_first,
         .world_count = renderer->shadows.world_count,
         .stats = &request->stats,
@@ -507,8 +520,9 @@ static brume_result run_stages(struct run *run)
                                      cube(settings->medium_resolution)),
                                settings->method == BRUME_METHOD_DOM};
     TRY(run_if_changed(run, BRUME_STAGE_MEDIUM, medium, 4, work_medium));
-    TRY(shadows_plan(snapshot, settings, &renderer->geometry, shares->shadow,
-                     &renderer->shadow_plan));
+    TRY(update_world_map(run));
+    TRY(shadows_plan(snapshot, &renderer->world_map, settings, &renderer->geometry,
+                     shares->shadow, &renderer->shadow_plan));
     const uint64_t shadow[] = {stages[BRUME_STAGE_UPLOAD].revision,
                                snapshot->tables[BRUME_KIND_LIGHT].revision,
                                snapshot->world_revision,
@@ -574,6 +588,7 @@ void renderer_finish(struct gpu *gpu, struct renderer *renderer)
     medium_textures_finish(gpu, &renderer->medium);
     for (int stage = 0; stage < BRUME_STAGE_COUNT; ++stage)
         free(renderer->stages[stage].warnings);
+    world_map_finish(&renderer->world_map);
     shadows_finish(gpu, &renderer->shadows);
     transport_finish(gpu, &renderer->transport);
     view_pool_trim(gpu, &renderer->targets); /* all of them: its jobs have ended */

@@ -26,6 +26,7 @@ struct renderer {
     struct stage_record stages[BRUME_STAGE_COUNT];
     struct geometry geometry;
     struct medium_textures medium;
+    struct world_map world_map;
     struct shadows shadows;
     struct transport transport;
     struct view_targets *targets; /* the pool of its jobs' */

@@ -70,42 +70,6 @@ static uint32_t world_layer_count(const struct shadow_plan *plan)
     return (plan->world_samples * plan->distant + WORLD_TILES - 1) / WORLD_TILES;
 }
 
-static uint64_t lamp_layer_count(const struct snapshot *snapshot, const struct shadow_plan *plan)
-{
-    const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
-    uint64_t layers = 0;
-    for (uint32_t i = 0; i < table->count; ++i) {
-        const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
-        if (light->cast_shadow)
-            layers += (uint64_t)light_sample_count(light, plan->light_samples) *
-                      faces_of(light, plan->distant);
-    }
-    return layers;
-}
-
-static brume_result allocate(struct shadows *shadows, const struct snapshot *snapshot,
-                             const struct shadow_plan *plan)
-{
-    const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
-    const uint32_t views = plan->lamp_layers + plan->world_samples * plan->distant;
-    uint32_t samples = plan->world_samples;
-    for (uint32_t i = 0; i < table->count; ++i)
-        samples += light_sample_count(&((struct light_block *)table->entries[i].block)->light,
-                                      plan->light_samples);
-    free(shadows->lights);
-    free(shadows->samples);
-    free(shadows->views);
-    shadows->lights = calloc((size_t)table->count + 1, sizeof *shadows->lights);
-    shadows->samples = calloc((size_t)samples + 1, sizeof *shadows->samples);
-    shadows->views = calloc((size_t)views + 1, sizeof *shadows->views);
-    shadows->light_count = table->count;
-    shadows->sample_count = samples;
-    shadows->view_count = 0;
-    if (!shadows->lights || !shadows->samples || !shadows->views)
-        return fail(BRUME_E_MEMORY, "no memory for %u lights", table->count);
-    return BRUME_OK;
-}
-
 static int world_is_black(const brume_world *world)
 {
     return world->color[0] <= 0.0f && world->color[1] <= 0.0f && world->color[2] <= 0.0f;
@@ -117,15 +81,75 @@ static int distant_light(const struct snapshot *snapshot)
     return !(snapshot->world.has_volume && snapshot->world.reach < 0.0f);
 }
 
+/* Everything that lights as a lamp: the scene's, and the suns of its world's image. */
+struct lamps {
+    const struct table *table;
+    brume_light suns[WORLD_SPOTS];
+    uint32_t count;
+};
+
+static struct lamps all_lamps(const struct snapshot *snapshot, const struct world_map *map)
+{
+    struct lamps lamps = {.table = &snapshot->tables[BRUME_KIND_LIGHT]};
+    lamps.count = lamps.table->count;
+    if (world_is_black(&snapshot->world) || !distant_light(snapshot))
+        return lamps;
+    for (uint32_t i = 0; i < map->spot_count; ++i)
+        world_sun(&map->spots[i], &snapshot->world, &lamps.suns[i]);
+    lamps.count += map->spot_count;
+    return lamps;
+}
+
+static const brume_light *lamp(const struct lamps *lamps, uint32_t number)
+{
+    const struct table *table = lamps->table;
+    return number < table->count ? &((struct light_block *)table->entries[number].block)->light
+                                 : &lamps->suns[number - table->count];
+}
+
+static uint64_t lamp_layer_count(const struct lamps *lamps, const struct shadow_plan *plan)
+{
+    uint64_t layers = 0;
+    for (uint32_t i = 0; i < lamps->count; ++i) {
+        const brume_light *light = lamp(lamps, i);
+        if (light->cast_shadow)
+            layers += (uint64_t)light_sample_count(light, plan->light_samples) *
+                      faces_of(light, plan->distant);
+    }
+    return layers;
+}
+
+static brume_result allocate(struct shadows *shadows, const struct lamps *lamps,
+                             const struct shadow_plan *plan)
+{
+    const uint32_t views = plan->lamp_layers + plan->world_samples * plan->distant;
+    uint32_t samples = plan->world_samples;
+    for (uint32_t i = 0; i < lamps->count; ++i)
+        samples += light_sample_count(lamp(lamps, i), plan->light_samples);
+    free(shadows->lights);
+    free(shadows->samples);
+    free(shadows->views);
+    shadows->lights = calloc((size_t)lamps->count + 1, sizeof *shadows->lights);
+    shadows->samples = calloc((size_t)samples + 1, sizeof *shadows->samples);
+    shadows->views = calloc((size_t)views + 1, sizeof *shadows->views);
+    shadows->light_count = lamps->count;
+    shadows->sample_count = samples;
+    shadows->view_count = 0;
+    if (!shadows->lights || !shadows->samples || !shadows->views)
+        return fail(BRUME_E_MEMORY, "no memory for %u lights", lamps->count);
+    return BRUME_OK;
+}
+
 static int casts(const struct geometry *geometry)
 {
     return geometry->lower[0] <= geometry->upper[0];
 }
 
-brume_result shadows_plan(const struct snapshot *snapshot, const brume_settings *settings,
-                          const struct geometry *geometry, uint64_t budget,
-                          struct shadow_plan *plan)
+brume_result shadows_plan(const struct snapshot *snapshot, const struct world_map *map,
+                          const brume_settings *settings, const struct geometry *geometry,
+                          uint64_t budget, struct shadow_plan *plan)
 {
+    const struct lamps all = all_lamps(snapshot, map);
     *plan = (struct shadow_plan){
         .side = settings->shadow_resolution / 2 * 2, /* quarters of whole texels */
         .light_samples = (uint32_t)settings->light_samples,
@@ -136,7 +160,7 @@ brume_result shadows_plan(const struct snapshot *snapshot, const brume_settings 
     for (;;) {
         const int fewest = plan->light_samples == 1 && plan->world_samples <= FEW_DIRECTIONS;
         const uint32_t world = casts(geometry) ? world_layer_count(plan) : 0;
-        uint64_t lamps = casts(geometry) ? lamp_layer_count(snapshot, plan) : 0;
+        uint64_t lamps = casts(geometry) ? lamp_layer_count(&all, plan) : 0;
         if (fewest && lamps + world > MAX_LAYERS)
             lamps = MAX_LAYERS - world; /* the last lamps get none */
         const uint64_t layers = lamps + world;
@@ -155,15 +179,17 @@ brume_result shadows_plan(const struct snapshot *snapshot, const brume_settings 
                 plan->world_samples /= 2;
         } else {
             return fail(BRUME_E_MEMORY, "the shadow maps of %u lamps do not fit the memory budget",
-                        snapshot->tables[BRUME_KIND_LIGHT].count);
+                        all.count);
         }
     }
 }
 
 brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snapshot,
-                            const brume_settings *settings, const struct geometry *geometry,
-                            const struct shadow_plan *plan, struct job_control *control)
+                            const struct world_map *map, const brume_settings *settings,
+                            const struct geometry *geometry, const struct shadow_plan *plan,
+                            struct job_control *control)
 {
+    const struct lamps lamps = all_lamps(snapshot, map);
     const int casters = casts(geometry);
     const uint32_t wanted = plan->light_samples, world_count = plan->world_samples;
     const uint32_t distant = plan->distant;
@@ -177,15 +203,14 @@ brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snap
         job_warn(control, "SHADOWS_COARSER",
                  "shadow maps of %d instead of %d texels, to keep the memory budget", side,
                  settings->shadow_resolution);
-    TRY(allocate(shadows, snapshot, plan));
+    TRY(allocate(shadows, &lamps, plan));
     shadows->side = side;
     shadows->layer_count = plan->lamp_layers + plan->world_layers;
     shadows->world_faces = distant;
 
-    const struct table *table = &snapshot->tables[BRUME_KIND_LIGHT];
     uint32_t next_sample = 0, next_view = 0, left_out = 0;
-    for (uint32_t i = 0; i < table->count; ++i) {
-        const brume_light *light = &((struct light_block *)table->entries[i].block)->light;
+    for (uint32_t i = 0; i < lamps.count; ++i) {
+        const brume_light *light = lamp(&lamps, i);
         struct gpu_light *out = &shadows->lights[i];
         light_to_gpu(light, out);
         if (light->type == BRUME_LIGHT_SUN && !distant_light(snapshot))
@@ -220,13 +245,7 @@ brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snap
     shadows->world_first = next_sample;
     shadows->world_count = world_count;
     if (world_count) {
-        const struct entry *image =
-            table_find(&snapshot->tables[BRUME_KIND_IMAGE], snapshot->world.image);
-        float world_from_image[16];
-        if (!mat4_invert(snapshot->world.image_from_world, world_from_image))
-            mat4_identity(world_from_image);
-        TRY(world_samples(&snapshot->world, image ? (struct image_block *)image->block : NULL,
-                          world_from_image, world_count, shadows->samples + next_sample));
+        TRY(world_samples(&snapshot->world, map, world_count, shadows->samples + next_sample));
         for (uint32_t s = 0; s < world_count && casters; ++s) {
             struct gpu_light_sample *sample = &shadows->samples[next_sample + s];
             sample->position.w = (float)next_view;

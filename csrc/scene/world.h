@@ -7,12 +7,11 @@
 #include "brume.h"
 #include "brume_gpu.h"
 
-struct image_block;
+struct world_map;
 
-/* count samples; weight = radiance times the solid angle that the sample stands for. image may be
- * NULL. world_from_image turns image directions to the world's. */
-brume_result world_samples(const brume_world *world, const struct image_block *image,
-                           const float world_from_image[16], uint32_t count,
+/* count samples; weight = radiance times the solid angle that the sample stands for. The map's spots
+ * are left out. */
+brume_result world_samples(const brume_world *world, const struct world_map *map, uint32_t count,
                            struct gpu_light_sample *out);
 
 #endif

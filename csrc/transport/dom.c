@@ -115,8 +115,17 @@ static brume_result make_ordinates(struct dom_work *work)
     vec4 *directions = work->directions;
     dom_quadrature(work->count, directions, work->axes);
     block->count = (ivec4){work->count, work->across, 0, 0};
+    vec4 towards[MOST_ORDINATES], sky[MOST_ORDINATES] = {{0}};
     for (int i = 0; i < work->count; ++i)
+        towards[i] =
+            (vec4){-directions[i].x, -directions[i].y, -directions[i].z, directions[i].w};
+    const struct transport_input *input = work->cells.input;
+    if (input->world_count)
+        world_means(input->world_map, input->world, towards, work->count, sky);
+    for (int i = 0; i < work->count; ++i) {
         block->list[i].direction = directions[i];
+        block->list[i].world = block->list[i].sky = sky[i];
+    }
     const brume_result result = buffer_init(&gpu->memory, &work->ordinates, FOR_TRANSPORT,
                                             sizeof *block, block, "ordinates");
     free(block);
@@ -231,7 +240,7 @@ static brume_result prepare(struct dom_work *work)
     laps_go(cells->laps, BRUME_FIELD_PREPARE);
     TRY(program_compute(&cells->input->gpu->programs, "dom_ordinates", &program));
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ORDINATES, work->ordinates.id);
-    program_dispatch(program, GROUP_REST * work->count, 1, 1);
+    program_dispatch(program, work->count, 1, 1);
     glMemoryBarrier(GL_UNIFORM_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
     if (work->surrounded && !work->around)
         TRY(dom_look_out(cells, &work->ordinates, work->directions, work->count));

@@ -9,6 +9,7 @@
 #include "brume_gpu.h"
 #include "gl/device.h"
 #include "render/geometry.h"
+#include "scene/world_map.h"
 #include "transport/medium_textures.h"
 
 /* What the view takes light from. */
@@ -40,6 +41,8 @@ struct transport_input {
     uint64_t medium_revision;
     uint64_t world_signature;       /* of the world's samples and shadow maps */
     brume_stats *stats;             /* counts what is propagated */
+    const brume_world *world;
+    const struct world_map *world_map;
     uint32_t world_first, world_count; /* samples */
     int tau_size[3];                /* texels of the optical depths' texture, 0: none wanted */
 };

@@ -8,6 +8,6 @@
 /* Offset from the pixel's centre, in pixels, of sample number index. Sample 0 is the centre. The
  * offsets are distributed as the Blackman-Harris filter, so all weights are 1. What Blender calls
  * its width is the distance from the centre at which it ends. */
-void filter_offset(uint32_t index, float width, float offset[2]);
+void filter_offset(uint32_t index, uint32_t count, float width, float offset[2]);
 
 #endif

@@ -34,7 +34,7 @@ static vec4 offset_by(vec4 base, vec4 x, float by_x, vec4 y, float by_y)
 /* The sample's offset in normalised device coordinates. */
 static void sample_offset(const brume_view *view, uint32_t sample, float ndc[2])
 {
-    filter_offset(sample, view->filter_width, ndc);
+    filter_offset(sample, view->samples, view->filter_width, ndc);
     ndc[0] *= 2.0f / (float)view->width;
     ndc[1] *= 2.0f / (float)view->height;
 }

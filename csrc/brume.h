@@ -527,7 +527,7 @@ typedef struct brume_view {
                                         times a second */
     uint32_t urgent;                 /* 1: served before all jobs that are not: somebody waits */
     uint32_t world_draws;            /* of the world's directions, how many a pixel takes in all its
-                                        samples: fewer are quicker and grainier; 0: 64 */
+                                        samples: fewer are quicker and grainier; 0: 32 */
     uint32_t half_march;             /* 1: light in media at half the resolution, fitted to edges of
                                         surfaces: about four times as quick, and softer */
 } brume_view;

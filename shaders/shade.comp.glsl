@@ -43,7 +43,7 @@ vec3 light_surface(surface s, vec3 p, gpu_light light, ivec2 pixel, uint number)
 // that they leave no pattern.
 vec3 world_transmittance(vec3 p, vec3 towards, float within)
 {
-    return distant_transmittance(p, towards, 4.0 * frame.medium_lower.w, within);
+    return distant_transmittance(p, towards, 8.0 * frame.medium_lower.w, within);
 }
 
 float world_shadow(gpu_light_sample w, vec3 p, vec3 normal)

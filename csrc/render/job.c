@@ -64,7 +64,7 @@ static brume_result check_view(brume_view *view)
     if (view->filter_width == 0.0f)
         view->filter_width = 1.5f;
     if (view->world_draws == 0)
-        view->world_draws = 64;
+        view->world_draws = 32;
     view->passes |= 1u << BRUME_PASS_COMBINED;
     view->passes &= (1u << BRUME_PASS_COUNT) - 1u;
     REQUIRE(view->width >= 1 && view->width <= 16384);

@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What comes into the lattice along an ordinate, where surfaces beyond its sides hide the world: of a map
-// that looks out of the lattice against it, the mean over all texels that see past the lattice's end.
-// These surfaces reflect the lamps' light and the world's, as matt as all do in the lattice.
+// What comes into the lattice along an ordinate: the world's light, or what surfaces beyond the lattice's
+// sides send, which hide it. A map that looks out of the lattice against the ordinate tells where these are;
+// they reflect the lamps' light and the world's, as matt as all do in the lattice.
 #version 450 core
 #include "lib/transmittance.glsl"
 #include "lib/shadow.glsl"
 
-layout(local_size_x = GROUP_REST) in;
-
-#define ORDINATES_WRITTEN
 #include "lib/ordinates.glsl"
+
+layout(local_size_x = GROUP_PIXELS, local_size_y = GROUP_PIXELS) in;
 
 layout(location = 0) uniform ivec2 map; // the ordinate; texels of a side
 
 layout(binding = SLOT_RSM) uniform sampler2D rsm[3]; // position, normal, reflectance
 
-shared vec4 parts[GROUP_REST];
+layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image2DArray surroundings_image;
 
 vec3 reflected(vec3 p, vec3 normal, vec3 reflectance, int lot)
 {
@@ -35,35 +34,23 @@ vec3 reflected(vec3 p, vec3 normal, vec3 reflectance, int lot)
     }
     for (int k = 0; k < ordinates.count.x; ++k) {
         vec4 direction = ordinates.list[k].direction;
-        sum += ordinates.list[k].sky.rgb * (direction.w * max(-dot(normal, direction.xyz), 0.0));
+        sum += ordinates.list[k].world.rgb * (direction.w * max(-dot(normal, direction.xyz), 0.0));
     }
     return reflectance * sum / PI;
 }
 
 void main()
 {
-    int number = map.x, share = int(gl_LocalInvocationID.x);
-    vec3 way = ordinates.list[number].direction.xyz, sky = ordinates.list[number].sky.rgb;
-    vec4 sum = vec4(0.0);
-    for (int i = share; i < map.y * map.y; i += GROUP_REST) {
-        ivec2 texel = ivec2(i % map.y, i / map.y);
-        vec4 position = texelFetch(rsm[0], texel, 0);
-        if (position.w == REFLECTS_WITHIN)
-            continue;
-        vec3 light = sky;
-        if (position.w != 0.0) {
-            vec3 normal = texelFetch(rsm[1], texel, 0).xyz;
-            light = reflected(position.xyz, dot(normal, way) < 0.0 ? -normal : normal,
-                              texelFetch(rsm[2], texel, 0).rgb, i);
-        }
-        sum += vec4(light, 1.0);
-    }
-    parts[share] = sum;
-    barrier();
-    if (share != 0)
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    int number = map.x;
+    if (any(greaterThanEqual(texel, ivec2(map.y))))
         return;
-    sum = vec4(0.0);
-    for (int i = 0; i < GROUP_REST; ++i)
-        sum += parts[i];
-    ordinates.list[number].world = vec4(sum.w > 0.0 ? sum.rgb / sum.w : sky, 0.0);
+    vec3 light = ordinates.list[number].world.rgb;
+    if (texelFetch(rsm[0], texel, 0).w != 0.0) {
+        vec3 normal = texelFetch(rsm[1], texel, 0).xyz;
+        bool turned_away = dot(normal, ordinates.list[number].direction.xyz) < 0.0;
+        light = reflected(texelFetch(rsm[0], texel, 0).xyz, turned_away ? -normal : normal,
+                          texelFetch(rsm[2], texel, 0).rgb, texel.x + map.y * texel.y);
+    }
+    imageStore(surroundings_image, ivec3(texel, number), fit(light, 0.0));
 }

@@ -11,7 +11,7 @@
 layout(local_size_x = 4 * GROUP_PIXELS, local_size_y = GROUP_PIXELS) in;
 
 // Number of the slice, from where light enters; first ordinate; their major axis; 1: the world's own
-// light on its way into the lattice, 0: light from sources in it.
+// light on its way into the lattice, 2: also that of surfaces around it, 0: light from sources in it.
 layout(location = 0) uniform ivec4 pass;
 // The lattice around, -1: none; how many tiles of ordinates stand along z in its textures.
 layout(location = 1) uniform ivec2 around;
@@ -22,6 +22,7 @@ layout(binding = SLOT_CELL_WALLS) uniform sampler3D cell_walls; // radiance
 layout(binding = SLOT_ANGULAR) uniform sampler3D sources;       // w: 1 where there is a medium
 layout(binding = SLOT_SLICE) uniform sampler3D slice_before;
 layout(binding = SLOT_MEANS_AROUND) uniform sampler3D means_around;
+layout(binding = SLOT_SURROUNDINGS) uniform sampler2DArray surroundings;
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D mean_image;
 layout(binding = SLOT_OUTPUT + 1, rgba16f) writeonly uniform image3D slice_image;
@@ -30,10 +31,16 @@ layout(binding = SLOT_OUTPUT + 2, rgba16f) writeonly uniform image3D hits_image;
 // Software runs through both sides of every branch, but not through loops that nobody enters: what is
 // seldom needed stands in loops.
 
-// Radiance that comes from a cell beyond the lattice's side: of the lattice around, or of the world.
+// Radiance that comes from a cell beyond the lattice's side: of the lattice around, or of the world and of
+// surfaces there.
 vec3 outside(ivec3 cell, int number)
 {
-    vec3 light = ordinates.list[number].world.rgb * float(pass.w);
+    vec3 light = ordinates.list[number].world.rgb * float(min(pass.w, 1));
+    for (int i = pass.w; i == 2; i = 0) {
+        vec4 p = vec4(cell_centre(level, cell), 1.0);
+        vec2 at = vec2(dot(p, ordinates.list[number].map_u), dot(p, ordinates.list[number].map_v));
+        light = textureLod(surroundings, vec3(at, number), 0.0).rgb;
+    }
     for (int i = around.x; i >= 0; i = -1) {
         gpu_field field = frame.fields[i];
         vec3 at = (cell_centre(level, cell) - field.lower.xyz) / field.lower.w;

@@ -12,5 +12,5 @@ _Static_assert(sizeof(struct gpu_lattice_pass) == 32, "gpu_lattice_pass");
 _Static_assert(sizeof(struct gpu_reflection) == 112, "gpu_reflection");
 _Static_assert(sizeof(struct gpu_depth_source) == 48, "gpu_depth_source");
 _Static_assert(sizeof(struct gpu_field) == 64, "gpu_field");
-_Static_assert(sizeof(struct gpu_ordinate) == 144, "gpu_ordinate");
+_Static_assert(sizeof(struct gpu_ordinate) == 160, "gpu_ordinate");
 _Static_assert(sizeof(struct gpu_frame) % 16 == 0, "gpu_frame");

@@ -22,7 +22,8 @@ struct dom_work {
     struct lpv_work cells;         /* the lattice: what it is filled with, and its surfaces */
     const struct dom_work *around; /* the lattice around, whose light is known; or NULL */
     int number;                    /* of the lattice, from outside */
-    bool surrounded;               /* whether surfaces stand beyond the outermost one's sides */
+    bool surrounded;               /* whether surfaces stand beyond the outermost one's sides, */
+    struct texture surroundings;   /* which this shows then, of the outermost */
     bool has_within;               /* whether another stands in it */
     int count, axes[3];            /* ordinates: all, and by their major axes */
     vec4 directions[MOST_ORDINATES];
@@ -117,14 +118,15 @@ static brume_result make_ordinates(struct dom_work *work)
     block->count = (ivec4){work->count, work->across, 0, 0};
     vec4 towards[MOST_ORDINATES], sky[MOST_ORDINATES] = {{0}};
     for (int i = 0; i < work->count; ++i)
-        towards[i] =
-            (vec4){-directions[i].x, -directions[i].y, -directions[i].z, directions[i].w};
+        towards[i] = (vec4){-directions[i].x, -directions[i].y, -directions[i].z, directions[i].w};
     const struct transport_input *input = work->cells.input;
     if (input->world_count)
         world_means(input->world_map, input->world, towards, work->count, sky);
     for (int i = 0; i < work->count; ++i) {
         block->list[i].direction = directions[i];
-        block->list[i].world = block->list[i].sky = sky[i];
+        block->list[i].world = sky[i];
+        if (work->surrounded)
+            dom_place_map(&work->cells, &block->list[i]);
     }
     const brume_result result = buffer_init(&gpu->memory, &work->ordinates, FOR_TRANSPORT,
                                             sizeof *block, block, "ordinates");
@@ -175,7 +177,7 @@ static void finish(struct dom_work *work)
         &work->slices[1],  &work->cuts,        &work->wall,       &work->first,
         &work->world,      &work->now,         &work->next,       &cells->links,
         &cells->walls,     &work->depths,      &work->missing[0], &work->missing[1],
-        &work->missing[2], &work->world_means, &work->emission};
+        &work->missing[2], &work->world_means, &work->emission,   &work->surroundings};
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         texture_finish(memory, all[i]);
     for (int i = 0; i < HISTORY; ++i) {
@@ -242,8 +244,9 @@ static brume_result prepare(struct dom_work *work)
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ORDINATES, work->ordinates.id);
     program_dispatch(program, work->count, 1, 1);
     glMemoryBarrier(GL_UNIFORM_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_ORDINATES, work->ordinates.id);
     if (work->surrounded && !work->around)
-        TRY(dom_look_out(cells, &work->ordinates, work->directions, work->count));
+        TRY(dom_look_out(cells, work->directions, work->count, &work->surroundings));
     clear(&work->wall);
     clear(&work->now);
     clear(&work->hits);
@@ -264,6 +267,8 @@ static brume_result sweep(struct dom_work *work, bool world)
     bind_lattice(work);
     glBindTextureUnit(SLOT_CELL_WALLS, work->wall.id);
     glBindTextureUnit(SLOT_ANGULAR, work->sources.id);
+    if (work->surroundings.id)
+        glBindTextureUnit(SLOT_SURROUNDINGS, work->surroundings.id);
     const struct dom_work *around = work->around;
     if (around)
         glBindTextureUnit(SLOT_MEANS_AROUND, world ? around->world_means.id : around->means.id);
@@ -278,7 +283,8 @@ static brume_result sweep(struct dom_work *work, bool world)
         for (int axis = 0, begin = 0; axis < 3; begin += work->axes[axis++]) {
             if (slice >= dims[axis])
                 continue;
-            glProgramUniform4i(program->id, 0, slice, begin, axis, world);
+            glProgramUniform4i(program->id, 0, slice, begin, axis,
+                               world ? 1 + (work->surroundings.id != 0) : 0);
             program_dispatch(program, dims[(axis + 1) % 3], dims[(axis + 2) % 3], work->axes[axis]);
         }
         glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);

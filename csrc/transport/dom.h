@@ -23,10 +23,12 @@ void dom_quadrature(int count, vec4 directions[MOST_ORDINATES], int axes[3]);
 
 /* Whether geometry reaches beyond the outermost lattice. */
 bool dom_has_surroundings(const struct transport_input *input);
-/* Puts what surfaces beyond the lattice send along each ordinate in the place of the world that they
- * hide; ordinates and lattice are there and bound. */
-brume_result dom_look_out(struct lpv_work *cells, const struct buffer *ordinates,
-                          const vec4 *directions, int count);
+/* Tells the ordinate where in its map light is found. */
+void dom_place_map(const struct lpv_work *cells, struct gpu_ordinate *ordinate);
+/* Makes the maps, a layer an ordinate: radiance of the world, or of surfaces beyond the lattice that
+ * hide it. Ordinates and lattice are there and bound; the texture is new, and the caller's. */
+brume_result dom_look_out(struct lpv_work *cells, const vec4 *directions, int count,
+                          struct texture *out);
 
 /* Shares of the results of `count` iterations, 1 together, that make their residuals' sum least;
  * from the residuals' products. Any thread. */

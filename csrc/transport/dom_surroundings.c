@@ -5,7 +5,7 @@
 #include "scene/light_view.h"
 #include "transport/dom.h"
 
-#define SIDE 16 /* texels of a map */
+#define SIDE 32 /* texels of a map */
 
 struct maps {
     struct texture colors[3], depth; /* position, normal, reflectance */
@@ -54,16 +54,31 @@ static void finish_maps(struct memory *memory, struct maps *maps)
     texture_finish(memory, &maps->depth);
 }
 
+static void view_out(const struct lpv_work *cells, const vec4 *direction,
+                     struct gpu_shadow_view *view)
+{
+    const struct geometry *geometry = cells->input->geometry;
+    float lower[3], upper[3];
+    lpv_field_box(cells->field, lower, upper);
+    light_view_distant(geometry->lower, geometry->upper, lower, upper, direction, SIDE, view);
+}
+
+void dom_place_map(const struct lpv_work *cells, struct gpu_ordinate *ordinate)
+{
+    struct gpu_shadow_view view;
+    view_out(cells, &ordinate->direction, &view);
+    const float *m = view.clip_from_world.m;
+    ordinate->map_u = (vec4){0.5f * m[0], 0.5f * m[4], 0.5f * m[8], 0.5f * m[12] + 0.5f};
+    ordinate->map_v = (vec4){0.5f * m[1], 0.5f * m[5], 0.5f * m[9], 0.5f * m[13] + 0.5f};
+}
+
 /* Out of the lattice, against the ordinate. */
 static brume_result draw(struct lpv_work *cells, const struct maps *maps, const vec4 *direction)
 {
     static const float nothing[4], far_;
     const struct transport_input *input = cells->input;
-    float lower[3], upper[3];
     struct gpu_shadow_view view;
-    lpv_field_box(cells->field, lower, upper);
-    light_view_distant(input->geometry->lower, input->geometry->upper, lower, upper, direction,
-                       SIDE, &view);
+    view_out(cells, direction, &view);
     glBindFramebuffer(GL_FRAMEBUFFER, maps->framebuffer);
     glViewport(0, 0, SIDE, SIDE);
     glClearNamedFramebufferfv(maps->framebuffer, GL_COLOR, 0, nothing);
@@ -75,31 +90,33 @@ static brume_result draw(struct lpv_work *cells, const struct maps *maps, const 
 }
 
 static brume_result look_out(struct lpv_work *cells, const struct maps *maps,
-                             const struct buffer *ordinates, const vec4 *directions, int count)
+                             const vec4 *directions, int count, const struct texture *out)
 {
     const struct program *program;
     TRY(program_compute(&cells->input->gpu->programs, "dom_surroundings", &program));
+    glBindImageTexture(SLOT_OUTPUT, out->id, 0, GL_TRUE, 0, GL_WRITE_ONLY, out->format);
     for (int k = 0; k < count; ++k) {
         TRY(opv_go_on(&cells->passes, 0.0f));
         TRY(draw(cells, maps, &directions[k]));
         for (int i = 0; i < 3; ++i)
             glBindTextureUnit((GLuint)(SLOT_RSM + i), maps->colors[i].id);
-        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_ORDINATES, ordinates->id);
         glProgramUniform2i(program->id, 0, k, SIDE);
-        program_dispatch(program, GROUP_REST, 1, 1);
+        program_dispatch(program, SIDE, SIDE, 1);
     }
-    glMemoryBarrier(GL_UNIFORM_BARRIER_BIT);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     return BRUME_OK;
 }
 
-brume_result dom_look_out(struct lpv_work *cells, const struct buffer *ordinates,
-                          const vec4 *directions, int count)
+brume_result dom_look_out(struct lpv_work *cells, const vec4 *directions, int count,
+                          struct texture *out)
 {
     struct memory *memory = &cells->input->gpu->memory;
     struct maps maps = {0};
+    TRY(texture_init(memory, out, FOR_TRANSPORT, GL_TEXTURE_2D_ARRAY, GL_RGBA16F, SIDE, SIDE, count,
+                     1, "surroundings"));
     brume_result result = make_maps(memory, &maps);
     if (result == BRUME_OK)
-        result = look_out(cells, &maps, ordinates, directions, count);
+        result = look_out(cells, &maps, directions, count, out);
     finish_maps(memory, &maps);
     return result;
 }

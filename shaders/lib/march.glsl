@@ -163,7 +163,8 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
             if (frame.paths.z == 0) {
                 sum += transmittance * step_weight(m.sigma_t, through, dt) * here * phase;
             } else {
-                float soft = phase_truncated(cosine, m.g);
+                // Its lobes below 0 are no light: with what is behind them they could outweigh the peak.
+                float soft = max(phase_truncated(cosine, m.g), 0.0);
                 vec3 sigma_t = m.sigma_t + forward_share(m.g) * m.sigma_s;
                 vec3 sharp_through = exp(-sigma_t * dt);
                 sum += here * (transmittance * step_weight(m.sigma_t, through, dt) * soft +

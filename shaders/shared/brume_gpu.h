@@ -90,6 +90,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_CELL_WALLS 31   /* radiance of the surfaces in a cell */
 #define SLOT_HISTORY 24      /* and three more: residuals, or results */
 #define SLOT_MEANS_AROUND 27 /* what cells' means are in the lattice around */
+#define SLOT_SURROUNDINGS 28 /* radiance that comes into the outermost lattice, a layer an ordinate */
 #define SLOT_CELL_DEPTHS 24  /* optical depths of cells as diffusion has them */
 #define SLOT_MISSING 25      /* and one more: what an iteration has yet to find, and a step before */
 
@@ -147,8 +148,6 @@ typedef struct mat4 { float m[16]; } mat4;
 #define MOMENTS 16
 #define MIXED 5
 #define HISTORY 4
-/* In a reflective map that looks out of the lattice: a surface that is still in it. */
-#define REFLECTS_WITHIN 0.5
 /* Below this optical depth of a cell light does not diffuse. */
 #define THINNEST 0.25
 
@@ -277,9 +276,9 @@ typedef struct gpu_field gpu_field;
 /* A direction that DOM carries light along. */
 struct gpu_ordinate {
     vec4 direction;      /* w: weight, sr */
-    vec4 world;          /* mean radiance that comes into the lattice along it: of the world around
-                            there, and of surfaces beyond the lattice */
-    vec4 sky;            /* of the world alone */
+    vec4 world;          /* mean radiance of the world around where it comes from */
+    vec4 map_u, map_v;   /* products with a point that light along it goes through tell where its
+                            radiance stands in the map of what surrounds the lattice, 0 to 1 */
     vec4 harmonics[4];   /* of the direction */
     uvec4 links_in;      /* bits of the four links by which light along it comes into a cell, */
     uvec4 links_out;     /* and goes on; as lib/cuts.glsl numbers them */

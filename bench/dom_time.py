@@ -33,7 +33,7 @@ sys.path.insert(0, os.path.join(ROOT, 'tests', 'pictures'))
 import compare
 
 PICTURES = os.path.join(ROOT, 'out', 'bench', 'dom_time')
-SCENES = ('cube', 'cloud', 'plume_vdb', 'room_smoke', 'room', 'arcade')
+SCENES = ('cube', 'cloud', 'plume_vdb', 'smoke_sky', 'lantern', 'room_smoke', 'room', 'arcade')
 SIZE, QUICK = (640, 360), (320, 180)
 COLUMNS = 32
 REFERENCE_SAMPLES = 64  # a seed

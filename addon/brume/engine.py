@@ -155,7 +155,8 @@ class BrumeEngine(bpy.types.RenderEngine):
         session.last_stats = last
         stats = last.stats
         line = (f"Brume | {last.whole_s:.2f} s | export {last.export_s * 1000:.0f}, "
-                f"{session.stage_times(stats)} | peak {stats.peak_bytes / 2 ** 20:.0f} MiB | "
+                f"{session.stage_times(stats)} | {session.iterations(stats)}"
+                f"peak {stats.peak_bytes / 2 ** 20:.0f} MiB | "
                 f"frame {depsgraph.scene_eval.frame_current}")
         self.update_memory_stats(memory_used=stats.total_bytes / 2 ** 20,
                                  memory_peak=stats.peak_bytes / 2 ** 20)

@@ -19,14 +19,17 @@ METHODS = [
 
 PRESETS = {
     'DRAFT': {"samples": 4, "medium_resolution": 64, "lattice_resolution": 32,
-              "field_resolution": 16, "ordinates": '26', "step": 4.0, "half_resolution_volumes": True,
-              "shadow_resolution": 256, "light_samples": 4, "world_samples": 32},
+              "field_resolution": 16, "ordinates": '26', "step": 4.0,
+              "half_resolution_volumes": True, "shadow_resolution": 256,
+              "light_samples": 4, "world_samples": 32},
     'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64,
-                "field_resolution": 32, "ordinates": '48', "step": 3.0, "half_resolution_volumes": True,
-                "shadow_resolution": 512, "light_samples": 8, "world_samples": 128},
+                "field_resolution": 32, "ordinates": '48', "step": 3.0,
+                "half_resolution_volumes": True, "shadow_resolution": 512, "light_samples": 8,
+                "world_samples": 128},
     'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96,
-              "field_resolution": 64, "ordinates": '96', "step": 1.0, "half_resolution_volumes": False,
-              "shadow_resolution": 1024, "light_samples": 16, "world_samples": 256},
+              "field_resolution": 64, "ordinates": '96', "step": 1.0,
+              "half_resolution_volumes": False, "shadow_resolution": 1024,
+              "light_samples": 16, "world_samples": 256},
 }
 _DEFAULT = PRESETS['PREVIEW']
 

@@ -111,6 +111,9 @@ static void print_stats(const brume_job *job)
     printf("%-12s %10.1f\n", "total", stats.total_ms);
     printf("%-12s %10.1f MiB\n%-12s %10.1f MiB\n", "GPU memory", (double)stats.total_bytes / mib,
            "at its peak", (double)stats.peak_bytes / mib);
+    if (stats.iterations > 0)
+        printf("%-12s %10u, the last changed %.2g %%\n", "iterations", stats.iterations,
+               100.0 * stats.change);
     printf("medium %d x %d x %d, transport %d x %d x %d, %u samples\n", stats.medium_dims[0],
            stats.medium_dims[1], stats.medium_dims[2], stats.transport_dims[0],
            stats.transport_dims[1], stats.transport_dims[2], stats.samples);

@@ -5,9 +5,9 @@
 
 #include <stdint.h>
 
-/* Offset from the pixel's centre, in pixels, of sample number index. Sample 0 is the centre. The
- * offsets are distributed as the Blackman-Harris filter, so all weights are 1. What Blender calls
- * its width is the distance from the centre at which it ends. */
+/* Offset from the pixel's centre, in pixels, of sample number index, of count. Sample 0 is the centre.
+ * The offsets are distributed as the Blackman-Harris filter, so all weights are 1; their mean is 0,
+ * but for two samples. What Blender calls its width is the distance from the centre at which it ends. */
 void filter_offset(uint32_t index, uint32_t count, float width, float offset[2]);
 
 #endif

@@ -3,12 +3,10 @@
  * Humphreys, "Physically Based Rendering", 14.2.4, driven by a golden-ratio lattice. */
 #include "scene/world.h"
 #include "base/result.h"
-#include "math/frame.h"
 #include "scene/world_map.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #define PI 3.14159265358979323846
 
@@ -79,11 +77,7 @@ brume_result world_samples(const brume_world *world, const struct world_map *map
         const double azimuth = PI - 2.0 * PI * (x + u) / WORLD_WIDTH;
         float direction[3], turned[3];
         world_direction(polar, azimuth, direction);
-        mat4_vector(world_from_image, direction, turned);
-        const float length =
-            sqrtf(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2]);
-        for (int axis = 0; axis < 3; ++axis)
-            turned[axis] /= length;
+        world_turned(world_from_image, direction, turned);
         const double weight = world_cell_solid(y) / (density * count);
         const float *rgb = table + 3 * (y * WORLD_WIDTH + x);
         out[i].position = (vec4){turned[0], turned[1], turned[2], -1.0f};

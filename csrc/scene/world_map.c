@@ -16,8 +16,8 @@
 #define THRESHOLDS 14
 /* Wider ones are left to what takes the world as a whole: 48 ordinates stand 30 degrees apart. */
 #define WIDEST 0.1
-/* Of all the world's light: what is less makes no difference. */
-#define LEAST_SHARE 0.01
+/* Of all the world's light: what is less makes no difference. Those that have much of it come first. */
+static const double least_shares[] = {0.1, 0.01};
 
 static double luminance(const float *rgb)
 {
@@ -180,14 +180,15 @@ static brume_result find_spots(struct world_map *map, const struct image_block *
     double total = 0.0;
     for (int cell = 0; cell < WORLD_CELLS; ++cell)
         total += world_cell_solid(cell / WORLD_WIDTH) * luminance(map->rgb + 3 * cell);
-    part.threshold = LOWEST * total / (4.0 * PI);
-    for (int i = 0; i < THRESHOLDS && total > 0.0; ++i, part.threshold *= 2.0) {
+    for (int i = 0; i < 2 * THRESHOLDS && total > 0.0; ++i) {
+        const double least = least_shares[i / THRESHOLDS] * total;
+        part.threshold = ldexp(LOWEST * total / (4.0 * PI), i % THRESHOLDS);
         memset(seen, 0, WORLD_CELLS);
         for (int cell = 0; cell < WORLD_CELLS && map->spot_count < WORLD_SPOTS; ++cell) {
             if (seen[cell] || luminance(map->rgb + 3 * cell) <= part.threshold)
                 continue;
             flood(map->rgb, seen, cell, &part);
-            if (part.excess >= LEAST_SHARE * total && radius_of(&part) <= WIDEST)
+            if (part.excess >= least && radius_of(&part) <= WIDEST)
                 take_out(image, &part, map->rgb, &map->spots[map->spot_count++]);
         }
     }
@@ -231,8 +232,7 @@ void world_turn(const brume_world *world, float out[16])
         mat4_identity(out);
 }
 
-/* A direction of the image in the world, of length 1. */
-static void turned(const float world_from_image[16], const float direction[3], float out[3])
+void world_turned(const float world_from_image[16], const float direction[3], float out[3])
 {
     mat4_vector(world_from_image, direction, out);
     const float scale = 1.0f / sqrtf(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]);
@@ -244,7 +244,7 @@ void world_sun(const struct world_spot *spot, const brume_world *world, brume_li
 {
     float world_from_image[16], towards[3], u[3], v[3];
     world_turn(world, world_from_image);
-    turned(world_from_image, spot->direction, towards);
+    world_turned(world_from_image, spot->direction, towards);
     frame_around(towards, u, v);
     *out = (brume_light){
         .type = BRUME_LIGHT_SUN,
@@ -273,7 +273,7 @@ void world_means(const struct world_map *map, const brume_world *world, const ve
         const int x = cell % WORLD_WIDTH, y = cell / WORLD_WIDTH;
         world_direction(PI * (y + 0.5) / WORLD_HEIGHT, PI - 2.0 * PI * (x + 0.5) / WORLD_WIDTH,
                         own);
-        turned(world_from_image, own, there);
+        world_turned(world_from_image, own, there);
         int nearest = 0;
         for (int i = 0; i < count; ++i) {
             const float cosine =

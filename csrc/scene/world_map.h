@@ -35,8 +35,10 @@ void world_map_finish(struct world_map *map);
 
 /* The image's unit vector. Polar angles are from -Z; azimuths are as Cycles': pi - 2 pi u. */
 void world_direction(double polar, double azimuth, float out[3]);
-/* Turns the image's directions to the world's, and keeps their length. */
+/* Turns the image's directions to the world's. */
 void world_turn(const brume_world *world, float out[16]);
+/* A direction turned by that, of length 1. */
+void world_turned(const float world_from_image[16], const float direction[3], float out[3]);
 /* Solid angle of each cell of a row. */
 double world_cell_solid(int row);
 

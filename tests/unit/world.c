@@ -189,6 +189,22 @@ static void suns_are_taken_out(void **state)
     world_map_finish(&map);
 }
 
+/* Of more suns than lamps are made of, the one that sends most is a lamp, wherever it stands. */
+static void brightest_comes_first(void **state)
+{
+    (void)state;
+    draw_sky();
+    for (int i = 0; i < 8; ++i)
+        draw_disk((const double[]){cos(i * 0.75), sin(i * 0.75), -0.3}, 0.03, 9e3f, 9e3f, 9e3f);
+    draw_disk((const double[]){0.3, 0.2, 0.9}, 0.012, 1e6f, 1e6f, 1e6f);
+    struct world_map map = map_of_pixels();
+    assert_int_equal(map.spot_count, WORLD_SPOTS);
+    assert_true(map.spots[0].direction[2] > 0.9f);
+    for (int i = 1; i < WORLD_SPOTS; ++i)
+        assert_true(map.spots[i].irradiance[0] < 0.2f * map.spots[0].irradiance[0]);
+    world_map_finish(&map);
+}
+
 /* What a coarse quadrature takes of the world is all of it, from about where it is. */
 static void means_send_what_the_world_does(void **state)
 {
@@ -248,6 +264,7 @@ int main(void)
         cmocka_unit_test(plain_world_sends_four_pi),
         cmocka_unit_test(bright_part_is_where_it_is),
         cmocka_unit_test(suns_are_taken_out),
+        cmocka_unit_test(brightest_comes_first),
         cmocka_unit_test(means_send_what_the_world_does),
         cmocka_unit_test(odd_images),
     };

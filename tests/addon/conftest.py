@@ -96,6 +96,7 @@ def scene():
     settings = scene.render.image_settings
     settings.file_format, settings.color_depth = 'OPEN_EXR', '32'
     scene.brume.preset = 'DRAFT'
+    scene.brume.half_resolution_volumes = False  # pictures are of a few pixels here
     return scene
 
 

@@ -86,9 +86,9 @@ def test_installed_add_on_renders(package, blender, tmp_path):
     assert picture.stat().st_size > 0
 
     # spoil an installed shader: if it is the one in use, the next render fails and names it
-    shader = installed / "lib" / "shaders" / "march.comp.glsl"
+    shader = installed / "lib" / "shaders" / "shade.comp.glsl"
     shader.write_text(shader.read_text() + "spoilt\n")
     enable = "import bpy; bpy.ops.preferences.addon_enable(module='brume')"
     done = blender(enable, render)
     assert done.returncode == 1
-    assert "march.comp.glsl" in done.stdout + done.stderr
+    assert "shade.comp.glsl" in done.stdout + done.stderr

@@ -23,6 +23,6 @@ def freezes_once():
     mark = Path(os.environ["BRUME_FROZE_BEFORE"])
     if not mark.exists():
         mark.touch()
-        raise AttributeError(launch.READ_ONLY)
+        raise AttributeError(launch.READ_ONLY[0])
     yield 0.0
     return "went on"

@@ -15,9 +15,11 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 WINDOW = 640, 480  # Blender makes none smaller
 TIMEOUT_S = 900
-# What Blender says of all that Python writes once its own flaw has struck (docs/blenders.md,
-# bench/readonly.py), the status that play.py then ends it with, and how often that may happen.
-READ_ONLY = "Writing to ID classes in this context is not allowed"
+# What Blender says of all that Python writes, and of operators, once its own flaw has struck
+# (docs/blenders.md, bench/readonly.py), the status that play.py then ends it with, and how often that
+# may happen.
+READ_ONLY = ("Writing to ID classes in this context is not allowed",
+             "can't modify blend data in this state (drawing/rendering)")
 FROZEN = 77
 FREEZES = 3
 # What Blender or the library says when something went wrong.
@@ -45,6 +47,10 @@ def scenarios(theme):
                 options = {word.arg: ast.literal_eval(word.value) for word in mark.keywords}
                 found[node.name] = {name for name, value in options.items() if value is True}
     return found
+
+
+def is_read_only(said):
+    return any(words in said for words in READ_ONLY)
 
 
 def play(theme, names, **environment):

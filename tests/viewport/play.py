@@ -63,7 +63,7 @@ def show(theme, results, names):
             entry["values"] = yield from function()
         except Exception:
             entry["error"] = traceback.format_exc()
-            if launch.READ_ONLY in entry["error"]:
+            if launch.is_read_only(entry["error"]):
                 leave(launch.FROZEN)
         entry["seconds"] = round(time.perf_counter() - began, 2)
         with open(results, "a", encoding="utf-8") as file:
@@ -73,7 +73,7 @@ def show(theme, results, names):
     except Exception:
         said = traceback.format_exc()
         print(said, flush=True)
-        leave(launch.FROZEN if launch.READ_ONLY in said else 1)
+        leave(launch.FROZEN if launch.is_read_only(said) else 1)
 
 
 def leave(status):

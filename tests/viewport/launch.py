@@ -16,8 +16,8 @@ ROOT = HERE.parents[1]
 WINDOW = 640, 480  # Blender makes none smaller
 TIMEOUT_S = 900
 # What Blender says of all that Python writes, and of operators, once its own flaw has struck
-# (docs/blenders.md, bench/readonly.py), the status that play.py then ends it with, and how often that
-# may happen.
+# (docs/blenders.md, bench/readonly.py), the status that play.py then ends it with, and how often
+# that may happen.
 READ_ONLY = ("Writing to ID classes in this context is not allowed",
              "can't modify blend data in this state (drawing/rendering)")
 FROZEN = 77

@@ -43,7 +43,7 @@ brume_result world_samples(const brume_world *world, const struct world_map *map
         const double solid = sin(PI * (y + 0.5) / WORLD_HEIGHT);
         for (int x = 0; x < WORLD_WIDTH; ++x) {
             const float *rgb = table + 3 * (y * WORLD_WIDTH + x);
-            mean += solid * (0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]);
+            mean += solid * world_luminance(rgb);
             for (int c = 0; c < 3; ++c)
                 whole[c] += solid * rgb[c];
         }
@@ -55,9 +55,8 @@ brume_result world_samples(const brume_world *world, const struct world_map *map
         double row = 0.0;
         for (int x = 0; x < WORLD_WIDTH; ++x) {
             const float *rgb = table + 3 * (y * WORLD_WIDTH + x);
-            const double luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
             /* A tenth evenly, so that dark parts are seen and no weight explodes. */
-            row += solid * (0.9 * luminance + 0.1 * mean + 1e-12);
+            row += solid * (0.9 * world_luminance(rgb) + 0.1 * mean + 1e-12);
             rows[y * WORLD_WIDTH + x] = row;
         }
         total += row;

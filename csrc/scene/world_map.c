@@ -19,7 +19,7 @@
 /* Of all the world's light: what is less makes no difference. Those that have much of it come first. */
 static const double least_shares[] = {0.1, 0.01};
 
-static double luminance(const float *rgb)
+double world_luminance(const float rgb[3])
 {
     return 0.2126 * (double)rgb[0] + 0.7152 * (double)rgb[1] + 0.0722 * (double)rgb[2];
 }
@@ -106,14 +106,14 @@ static void flood(const float *rgb, unsigned char *seen, int from, struct part *
     for (int next = 0; next < part->count; ++next) {
         const int x = part->cells[next] % WORLD_WIDTH, y = part->cells[next] / WORLD_WIDTH;
         add_to_middle(part,
-                      (luminance(rgb + 3 * part->cells[next]) - part->threshold) *
+                      (world_luminance(rgb + 3 * part->cells[next]) - part->threshold) *
                           world_cell_solid(y),
                       PI * (y + 0.5) / WORLD_HEIGHT, PI - 2.0 * PI * (x + 0.5) / WORLD_WIDTH);
         for (int i = 0; i < 9; ++i) {
             const int v = y + i / 3 - 1, u = (x + i % 3 - 1 + WORLD_WIDTH) % WORLD_WIDTH;
             const int cell = v * WORLD_WIDTH + u;
             if (v < 0 || v >= WORLD_HEIGHT || seen[cell] ||
-                luminance(rgb + 3 * cell) <= part->threshold)
+                world_luminance(rgb + 3 * cell) <= part->threshold)
                 continue;
             seen[cell] = 1;
             part->cells[part->count++] = cell;
@@ -134,7 +134,7 @@ static void sharpen(const struct image_block *image, struct part *part)
             for (int32_t x = x0; x < x1; ++x) {
                 const float *pixel =
                     image->pixels + 4 * ((size_t)y * (size_t)image->width + (size_t)x);
-                const double above = luminance(pixel) - part->threshold;
+                const double above = world_luminance(pixel) - part->threshold;
                 if (above > 0.0)
                     add_to_middle(&sharp, above * sin(polar), polar,
                                   PI - 2.0 * PI * (x + 0.5) / image->width);
@@ -155,7 +155,7 @@ static void take_out(const struct image_block *image, struct part *part, float *
     for (int i = 0; i < part->count; ++i) {
         float *cell = rgb + 3 * part->cells[i];
         const double solid = world_cell_solid(part->cells[i] / WORLD_WIDTH);
-        const double left = part->threshold / luminance(cell);
+        const double left = part->threshold / world_luminance(cell);
         for (int c = 0; c < 3; ++c) {
             spot->irradiance[c] += (float)(solid * (1.0 - left) * (double)cell[c]);
             cell[c] *= (float)left;
@@ -179,13 +179,13 @@ static brume_result find_spots(struct world_map *map, const struct image_block *
     }
     double total = 0.0;
     for (int cell = 0; cell < WORLD_CELLS; ++cell)
-        total += world_cell_solid(cell / WORLD_WIDTH) * luminance(map->rgb + 3 * cell);
+        total += world_cell_solid(cell / WORLD_WIDTH) * world_luminance(map->rgb + 3 * cell);
     for (int i = 0; i < 2 * THRESHOLDS && total > 0.0; ++i) {
         const double least = least_shares[i / THRESHOLDS] * total;
         part.threshold = ldexp(LOWEST * total / (4.0 * PI), i % THRESHOLDS);
         memset(seen, 0, WORLD_CELLS);
         for (int cell = 0; cell < WORLD_CELLS && map->spot_count < WORLD_SPOTS; ++cell) {
-            if (seen[cell] || luminance(map->rgb + 3 * cell) <= part.threshold)
+            if (seen[cell] || world_luminance(map->rgb + 3 * cell) <= part.threshold)
                 continue;
             flood(map->rgb, seen, cell, &part);
             if (part.excess >= least && radius_of(&part) <= WIDEST)

@@ -33,6 +33,7 @@ brume_result world_map_update(struct world_map *map, const struct image_block *i
                               uint64_t revision);
 void world_map_finish(struct world_map *map);
 
+double world_luminance(const float rgb[3]);
 /* The image's unit vector. Polar angles are from -Z; azimuths are as Cycles': pi - 2 pi u. */
 void world_direction(double polar, double azimuth, float out[3]);
 /* Turns the image's directions to the world's. */

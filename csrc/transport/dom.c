@@ -26,7 +26,7 @@ struct dom_work {
     struct texture surroundings;   /* which this shows then, of the outermost */
     bool has_within;               /* whether another stands in it */
     int count, axes[3];            /* ordinates: all, and by their major axes */
-    vec4 directions[MOST_ORDINATES];
+    vec4 directions[MOST_ORDINATES], sky[MOST_ORDINATES]; /* the world's radiance along each */
     int across; /* tiles of theirs along z */
     struct buffer ordinates, dots;
     struct texture sources, means, hits; /* by ordinates */
@@ -96,6 +96,22 @@ static bool has_world(const struct dom_work *work)
     return work->cells.input->world_count > 0 || work->surrounded;
 }
 
+/* Once for all lattices: their ordinates are the same, and it takes milliseconds. */
+static void find_sky(struct dom_work *work)
+{
+    const struct transport_input *input = work->cells.input;
+    if (work->around)
+        memcpy(work->sky, work->around->sky, sizeof work->sky);
+    if (work->around || !input->world_count)
+        return;
+    vec4 towards[MOST_ORDINATES];
+    for (int i = 0; i < work->count; ++i) {
+        const vec4 direction = work->directions[i];
+        towards[i] = (vec4){-direction.x, -direction.y, -direction.z, direction.w};
+    }
+    world_means(input->world_map, input->world, towards, work->count, work->sky);
+}
+
 /* Tiles of ordinates fill a column along z, then the next along y. */
 static brume_result make_ordinates(struct dom_work *work)
 {
@@ -116,15 +132,10 @@ static brume_result make_ordinates(struct dom_work *work)
     vec4 *directions = work->directions;
     dom_quadrature(work->count, directions, work->axes);
     block->count = (ivec4){work->count, work->across, 0, 0};
-    vec4 towards[MOST_ORDINATES], sky[MOST_ORDINATES] = {{0}};
-    for (int i = 0; i < work->count; ++i)
-        towards[i] = (vec4){-directions[i].x, -directions[i].y, -directions[i].z, directions[i].w};
-    const struct transport_input *input = work->cells.input;
-    if (input->world_count)
-        world_means(input->world_map, input->world, towards, work->count, sky);
+    find_sky(work);
     for (int i = 0; i < work->count; ++i) {
         block->list[i].direction = directions[i];
-        block->list[i].world = sky[i];
+        block->list[i].world = work->sky[i];
         if (work->surrounded)
             dom_place_map(&work->cells, &block->list[i]);
     }

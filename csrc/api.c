@@ -133,10 +133,10 @@ brume_result brume_vdb_list(const char *path, brume_grid_info *infos, uint32_t c
 }
 
 brume_result brume_grid_load_vdb(const char *path, const char *name, uint64_t max_voxels,
-                                 brume_grid **out)
+                                 uint32_t at_corner, brume_grid **out)
 {
     REQUIRE(path && name && out);
-    return vdb_load(path, name, max_voxels, out);
+    return vdb_load(path, name, max_voxels, at_corner != 0, out);
 }
 
 brume_result brume_grid_create(const char *name, const int32_t dims[3], int32_t channels,

@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* Raised by every change to a struct, an enumerator or a function below. */
-#define BRUME_ABI 7u
+#define BRUME_ABI 8u
 
 BRUME_API uint32_t brume_abi(void);
 
@@ -140,9 +140,11 @@ BRUME_API brume_result brume_vdb_list(const char *path, brume_grid_info *infos, 
                                       uint32_t *count);
 
 /* Loads one grid by name. max_voxels limits the memory held (0: 2^27); a grid with more is
- * averaged over cubes of `reduction` voxels. */
+ * averaged over cubes of `reduction` voxels. at_corner: 0: an index of the file stands for the
+ * centre of a voxel, as OpenVDB has it; 1: for its lower corner, as the engines of Blender before
+ * 5.0 have it, which show every voxel half a voxel further along each axis. */
 BRUME_API brume_result brume_grid_load_vdb(const char *path, const char *name, uint64_t max_voxels,
-                                           brume_grid **out);
+                                           uint32_t at_corner, brume_grid **out);
 
 /* data: channels * dims[0] * dims[1] * dims[2] floats, x fastest, channels interleaved. */
 BRUME_API brume_result brume_grid_create(const char *name, const int32_t dims[3], int32_t channels,

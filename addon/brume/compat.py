@@ -28,6 +28,11 @@ def identity(datablock):
     return f"{type(original).__name__}:{original.name_full}:{library.filepath if library else ''}"
 
 
+# Until 5.0 Cycles and EEVEE show the value at an index of a .vdb file half a voxel further along
+# each axis than OpenVDB places it.
+VOXELS_AT_CORNERS = bpy.app.version < (5, 0, 0)
+
+
 def has_use_nodes():
     """From 5.0 on use_nodes is always true and warns when read."""
     return bpy.app.version < (5, 0, 0)

@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-ABI = 7
+ABI = 8
 PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONMENT",
           "TRANSMITTANCE", "VOLUME_INDIRECT")
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3, 3)
@@ -230,7 +230,8 @@ _FUNCTIONS = {
     "brume_device_destroy": (None, [c_void_p]),
     "brume_device_describe": (_RESULT, [c_void_p, POINTER(DeviceInfo)]),
     "brume_vdb_list": (_RESULT, [c_char_p, POINTER(GridInfo), c_uint32, POINTER(c_uint32)]),
-    "brume_grid_load_vdb": (_RESULT, [c_char_p, c_char_p, c_uint64, POINTER(c_void_p)]),
+    "brume_grid_load_vdb": (_RESULT, [c_char_p, c_char_p, c_uint64, c_uint32,
+                                        POINTER(c_void_p)]),
     "brume_grid_create": (_RESULT, [c_char_p, Dims, c_int32, c_void_p, Mat4, POINTER(c_void_p)]),
     "brume_grid_describe": (_RESULT, [c_void_p, POINTER(GridInfo)]),
     "brume_grid_release": (None, [c_void_p]),
@@ -417,9 +418,11 @@ class Grid(Handle):
         return self._number.to_bytes(8, "little")
 
     @classmethod
-    def load_vdb(cls, path, name, max_voxels=0):
+    def load_vdb(cls, path, name, max_voxels=0, at_corner=False):
+        """at_corner: the file's indices stand for voxels' corners, not for their centres."""
         out = c_void_p()
-        library().grid_load_vdb(os.fsencode(path), name.encode(), max_voxels, byref(out))
+        library().grid_load_vdb(os.fsencode(path), name.encode(), max_voxels, at_corner,
+                                byref(out))
         return cls(out)
 
     @classmethod

@@ -28,9 +28,9 @@ using openvdb::Vec3d;
 
 namespace {
 
-/* OpenVDB's index coordinate (i, j, k) is the centre of a voxel, array space begins at its corner.
- */
-constexpr double CORNER_FROM_CENTRE = -0.5;
+/* Where array space begins, at the corner of its first voxel, in OpenVDB's index coordinates: those
+ * stand for the centres of voxels, or to who asks for it for their corners. */
+constexpr double CENTRES = -0.5, CORNERS = 0.0;
 
 constexpr uint64_t DEFAULT_VOXELS = uint64_t{1} << 27;
 /* Keeps every byte count below far from overflow; no machine holds so many. */
@@ -84,17 +84,17 @@ int medium_channels(const Entry &entry, const Head &head)
     return head.grid_class == "level set" ? 0 : grid_type(entry.tree).channels;
 }
 
-/* object_from_array of a field that begins at voxel min and whose voxels are `reduction` wide.
- * False unless the matrix is linear, finite and invertible. */
-bool place(const Head &head, const int64_t min[3], int64_t reduction, float out[16])
+/* object_from_array of a field that begins `corner` beside voxel min and whose voxels are
+ * `reduction` wide. False unless the matrix is linear, finite and invertible. */
+bool place(const Head &head, const int64_t min[3], double corner, int64_t reduction,
+           float out[16])
 {
     double columns[4][3];
     for (int row = 0; row < 3; ++row) {
         columns[3][row] = head.matrix[3][row];
         for (int axis = 0; axis < 3; ++axis) {
-            const double corner = static_cast<double>(min[axis]) + CORNER_FROM_CENTRE;
             columns[axis][row] = head.matrix[axis][row] * static_cast<double>(reduction);
-            columns[3][row] += corner * head.matrix[axis][row];
+            columns[3][row] += (static_cast<double>(min[axis]) + corner) * head.matrix[axis][row];
         }
     }
     bool finite = true;
@@ -406,7 +406,7 @@ void require_memory(const char *path, const char *name, uint64_t bytes)
                            path, static_cast<unsigned long long>(bytes >> 20))};
 }
 
-brume_grid *load(const char *path, const char *name, uint64_t max_voxels)
+brume_grid *load(const char *path, const char *name, uint64_t max_voxels, double corner)
 {
     File file(path);
     const Table table = read_table(file);
@@ -419,7 +419,7 @@ brume_grid *load(const char *path, const char *name, uint64_t max_voxels)
 
     int64_t min[3] = {0, 0, 0};
     const auto require_place = [&](int64_t reduction) {
-        if (!place(head, min, reduction, info.object_from_array))
+        if (!place(head, min, corner, reduction, info.object_from_array))
             throw Failure{fail(BRUME_E_TRANSFORM, "the transform of grid '%s' of '%s' is %s",
                                info.name, path,
                                head.linear ? "singular or not finite" : "not linear")};
@@ -489,7 +489,7 @@ brume_grid_info list_one(File &file, const Table &table, const Entry &entry)
             info.file_dims[axis] = facts.max[axis] - facts.min[axis] + 1;
         }
     }
-    info.supported = place(head, min, 1, info.object_from_array) && info.channels > 0;
+    info.supported = place(head, min, CENTRES, 1, info.object_from_array) && info.channels > 0;
     return info;
 }
 
@@ -509,8 +509,9 @@ brume_result vdb_list(const char *path, brume_grid_info *infos, uint32_t capacit
     });
 }
 
-brume_result vdb_load(const char *path, const char *name, uint64_t max_voxels, brume_grid **out)
+brume_result vdb_load(const char *path, const char *name, uint64_t max_voxels, bool at_corner,
+                      brume_grid **out)
 {
     REQUIRE(path && name && out);
-    return guarded(path, [&] { *out = load(path, name, max_voxels); });
+    return guarded(path, [&] { *out = load(path, name, max_voxels, at_corner ? CORNERS : CENTRES); });
 }

@@ -6,13 +6,16 @@
 
 #include "brume.h"
 
+#include <stdbool.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 brume_result vdb_list(const char *path, brume_grid_info *infos, uint32_t capacity,
                       uint32_t *count);
-brume_result vdb_load(const char *path, const char *name, uint64_t max_voxels, brume_grid **out);
+brume_result vdb_load(const char *path, const char *name, uint64_t max_voxels, bool at_corner,
+                      brume_grid **out);
 
 #ifdef __cplusplus
 }

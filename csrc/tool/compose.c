@@ -16,7 +16,7 @@ brume_result compose_grids(const options *given, brume_grid *grids[COMPOSE_GRIDS
     for (int i = 0; i < COMPOSE_GRIDS; i++) {
         if (names[i] == NULL)
             continue;
-        brume_result result = brume_grid_load_vdb(given->input, names[i], 0, &grids[i]);
+        brume_result result = brume_grid_load_vdb(given->input, names[i], 0, 0, &grids[i]);
         if (result != BRUME_OK)
             return result;
     }

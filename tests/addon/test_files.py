@@ -47,11 +47,11 @@ class Gate:
         self.loads, self.opened = [], threading.Event()
         load = Grid.load_vdb
 
-        def wait(path, name, max_voxels=0):
+        def wait(path, name, **options):
             assert threading.current_thread() is not threading.main_thread()
             self.loads.append(int(path[-5]))
             assert self.opened.wait(20)
-            return load(path, name, max_voxels)
+            return load(path, name, **options)
         monkeypatch.setattr(Grid, "load_vdb", wait)
 
 

@@ -90,10 +90,11 @@ static void write(const openvdb::GridBase::Ptr &grid)
 
 struct Field {
     brume_grid *grid;
-    explicit Field(const char *name, uint64_t max_voxels = 0, const char *file = "a.vdb")
+    explicit Field(const char *name, uint64_t max_voxels = 0, const char *file = "a.vdb",
+                   bool at_corner = false)
         : grid(nullptr)
     {
-        if (vdb_load(in_folder(file).c_str(), name, max_voxels, &grid) != BRUME_OK)
+        if (vdb_load(in_folder(file).c_str(), name, max_voxels, at_corner, &grid) != BRUME_OK)
             fail_msg("%s", last_error());
     }
     ~Field() { field_release(grid); }
@@ -119,7 +120,7 @@ static void expect_refusal(const char *file, const char *name, brume_result code
                            const std::vector<const char *> &words)
 {
     brume_grid *grid = nullptr;
-    const brume_result result = vdb_load(in_folder(file).c_str(), name, 0, &grid);
+    const brume_result result = vdb_load(in_folder(file).c_str(), name, 0, false, &grid);
     if (result != code)
         fail_msg("'%s': result %d, not %d: %s", name, result, code, last_error());
     assert_null(grid);
@@ -378,7 +379,8 @@ static void test_wide(void **)
     }
     expect_refusal("a.vdb", "densit", BRUME_E_GRID_UNKNOWN, {"'density'"});
     brume_grid *none = nullptr;
-    assert_int_equal(vdb_load(in_folder("a.vdb").c_str(), "density", 1, &none), BRUME_E_MEMORY);
+    assert_int_equal(vdb_load(in_folder("a.vdb").c_str(), "density", 1, false, &none),
+                     BRUME_E_MEMORY);
 }
 
 static void test_huge_tile(void **)
@@ -418,16 +420,18 @@ static void check_transform(const openvdb::math::Transform::Ptr &transform)
     uint32_t count = 0;
     assert_int_equal(vdb_list(in_folder("a.vdb").c_str(), &listed, 1, &count), BRUME_OK);
     assert_int_equal(listed.supported, 1);
-    for (const uint64_t limit : {0, 20}) {
-        const Field field("density", limit);
+    for (const int i : {0, 1, 2, 3}) {
+        const uint64_t limit = i % 2 ? 20 : 0;
+        const bool at_corner = i >= 2;
+        const Field field("density", limit, "a.vdb", at_corner);
         const float *m = field.info().object_from_array;
         const int r = field.info().reduction;
         assert_int_equal(r > 1, limit != 0);
-        if (r == 1)
+        if (i == 0)
             assert_memory_equal(m, listed.object_from_array, 16 * sizeof(float));
         for (const Vec3d &array : {Vec3d(0, 0, 0), Vec3d(1, 2, 3), Vec3d(-4, 9.5, 0.25)}) {
             /* The corner of voxel (-7, 11, 30) is half a voxel below its centre. */
-            const Vec3d index = Vec3d(-7.5, 10.5, 29.5) + array * r;
+            const Vec3d index = Vec3d(-7, 11, 30) - Vec3d(at_corner ? 0.0 : 0.5) + array * r;
             const Vec3d expected = transform->indexToWorld(index);
             /* Floats: a few roundings of the largest term. */
             const double scale =
@@ -642,7 +646,8 @@ static void test_not_a_file(void **)
     assert_int_equal(count, 77);
     assert_int_equal(vdb_list(nullptr, nullptr, 0, &count), BRUME_E_ARGUMENT);
     brume_grid *grid = nullptr;
-    assert_int_equal(vdb_load(in_folder("text.vdb").c_str(), nullptr, 0, &grid), BRUME_E_ARGUMENT);
+    assert_int_equal(vdb_load(in_folder("text.vdb").c_str(), nullptr, 0, false, &grid),
+                     BRUME_E_ARGUMENT);
 }
 
 /* --- Damage -------------------------------------------------------------------------------- */
@@ -664,7 +669,7 @@ static int load_in_child(const std::vector<const char *> &names)
         int status = vdb_list(path.c_str(), infos, 8, &count) == BRUME_OK ? 0 : 1;
         for (const char *name : names) {
             brume_grid *grid = nullptr;
-            if (vdb_load(path.c_str(), name, 1 << 22, &grid) == BRUME_OK)
+            if (vdb_load(path.c_str(), name, 1 << 22, false, &grid) == BRUME_OK)
                 field_release(grid);
             else
                 status = std::strstr(last_error(), "bad.vdb") ? 1 : 2;

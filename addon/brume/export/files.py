@@ -9,6 +9,7 @@ import threading
 from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
 
+from ..compat import VOXELS_AT_CORNERS
 from ..native import Grid, vdb_list
 
 # Of grids that no volume shows at present, so that a sequence that loops is read once.
@@ -54,7 +55,7 @@ class File:
             self.infos = grid_infos(self.path)
         for name in names:
             if name in self.infos and name not in self.grids:
-                self.grids[name] = Grid.load_vdb(self.path, name)
+                self.grids[name] = Grid.load_vdb(self.path, name, at_corner=VOXELS_AT_CORNERS)
 
     def has(self, names):
         return self.infos is not None and all(

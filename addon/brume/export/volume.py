@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..compat import identity
+from ..compat import VOXELS_AT_CORNERS, identity
 from ..native import BrumeError, Grid, vdb_list
 from . import material as materials
 from . import nodes
@@ -69,7 +69,8 @@ class _Scratch:
         self.infos = grid_infos(path)
 
     def grids(self, names):
-        return [self.target.grid((*self.stamp, name), partial(Grid.load_vdb, self.path, name))
+        return [self.target.grid((*self.stamp, name), partial(Grid.load_vdb, self.path, name,
+                                                              at_corner=VOXELS_AT_CORNERS))
                 for name in names]
 
 

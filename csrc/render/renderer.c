@@ -7,6 +7,7 @@
 #include "math/frame.h"
 #include "render/lattice.h"
 #include "scene/medium.h"
+#include "scene/sharpen.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -107,6 +108,8 @@ static brume_result work_medium(struct run *run)
                      run->renderer->shares.medium / MEDIUM_CELL_BYTES,
                      job_cancelled_callback, request->control, &lattice);
     free(volumes);
+    if (result == BRUME_OK)
+        result = medium_sharpen(&lattice);
     if (result == BRUME_OK) {
         if (lattice.coarser)
             job_warn(request->control, "MEDIUM_COARSER",
@@ -116,8 +119,8 @@ static brume_result work_medium(struct run *run)
                      request->settings.medium_resolution);
         result = medium_textures_upload(run->gpu, &run->renderer->medium, &lattice,
                                         request->settings.method == BRUME_METHOD_DOM);
-        medium_finish(&lattice);
     }
+    medium_finish(&lattice);
     return result;
 }
 

@@ -44,42 +44,110 @@ static double joint_bounds(struct volume *const *volumes, uint32_t count, double
  * the means and the rest by the interpolation between eight cells. */
 #define CELLS_PER_WIDTH 16.0
 
-/* Side of the smallest voxel of all volumes, m: cells smaller than that would hold nothing more.
- * 0 where a mesh gives the medium, whose shape any resolution makes better. */
-static double finest_voxel(struct volume *const *volumes, uint32_t count)
+/* Axes count as the world's if they drift from them by less than this over a grid, in voxels. */
+#define DRIFT 0.01
+
+/* The finest that the volumes hold. */
+struct voxels {
+    double side;      /* m; 0 where a mesh gives the medium, whose shape any resolution makes better */
+    bool cubes;       /* those of a grid, along the world's axes */
+    double corner[3]; /* of one of these cubes */
+};
+
+/* Whether cubes along the world's axes are what a grid's voxels are. */
+static bool are_cubes(const float world_from_array[16], const int32_t dims[3], double side)
 {
-    double finest = INFINITY;
+    int seen = 0;
+    for (int column = 0; column < 3; ++column) {
+        int along = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            const double length = fabs((double)world_from_array[4 * column + axis]);
+            if (fabs(length - side) * dims[column] < DRIFT * side) {
+                along = axis;
+                seen |= 1 << axis;
+            }
+        }
+        for (int axis = 0; axis < 3; ++axis)
+            if (axis != along &&
+                fabs((double)world_from_array[4 * column + axis]) * dims[column] > DRIFT * side)
+                return false;
+    }
+    return seen == 7;
+}
+
+static void see_grid(const struct volume *volume, const brume_grid *grid, struct voxels *voxels)
+{
+    float m[16];
+    mat4_multiply(volume->world_from_object, grid->info.object_from_array, m);
+    double side = INFINITY;
+    for (int column = 0; column < 3; ++column)
+        side = fmin(side, sqrt((double)m[4 * column] * m[4 * column] +
+                               (double)m[4 * column + 1] * m[4 * column + 1] +
+                               (double)m[4 * column + 2] * m[4 * column + 2]));
+    if (!(side < voxels->side))
+        return;
+    voxels->side = side;
+    voxels->cubes = are_cubes(m, grid->info.dims, side);
+    for (int axis = 0; axis < 3; ++axis)
+        voxels->corner[axis] = m[12 + axis];
+}
+
+static struct voxels finest_voxels(struct volume *const *volumes, uint32_t count)
+{
+    struct voxels voxels = {.side = INFINITY};
     for (uint32_t i = 0; i < count; ++i) {
         if (volumes[i]->positions)
-            return 0.0;
-        for (uint32_t g = 0; g < volumes[i]->grid_count; ++g) {
-            if (!volumes[i]->grids[g])
-                continue;
-            float m[16];
-            mat4_multiply(volumes[i]->world_from_object,
-                          volumes[i]->grids[g]->info.object_from_array, m);
-            for (int column = 0; column < 3; ++column)
-                finest = fmin(finest, sqrt((double)m[4 * column] * m[4 * column] +
-                                           (double)m[4 * column + 1] * m[4 * column + 1] +
-                                           (double)m[4 * column + 2] * m[4 * column + 2]));
-        }
+            return (struct voxels){.side = 0.0};
+        for (uint32_t g = 0; g < volumes[i]->grid_count; ++g)
+            if (volumes[i]->grids[g])
+                see_grid(volumes[i], volumes[i]->grids[g], &voxels);
         for (uint32_t g = 0; g < volumes[i]->gaussian_count; ++g) {
             double center[3];
             const double scale =
                 gaussian_place(&volumes[i]->gaussians[g], volumes[i]->world_from_object, center);
-            finest = fmin(finest, 1.0 / (CELLS_PER_WIDTH * scale));
+            const double side = 1.0 / (CELLS_PER_WIDTH * scale);
+            if (side < voxels.side)
+                voxels = (struct voxels){.side = side};
         }
     }
-    return finest;
+    return voxels;
+}
+
+static int32_t useful_resolution(const struct voxels *voxels, double longest)
+{
+    const double cells = ceil(longest / voxels->side - SLIVER);
+    /* Also where a mesh, with voxels of no size, makes it infinite. */
+    return cells < INT32_MAX ? (int32_t)fmax(cells, 1.0) : INT32_MAX;
 }
 
 int32_t medium_useful_resolution(struct volume *const *volumes, uint32_t count)
 {
     double lower[3], upper[3], extent[3];
     const double longest = joint_bounds(volumes, count, lower, upper, extent);
-    const double voxels = ceil(longest / finest_voxel(volumes, count) - SLIVER);
-    /* Also where a mesh, with voxels of no size, makes it infinite. */
-    return voxels < INT32_MAX ? (int32_t)fmax(voxels, 1.0) : INT32_MAX;
+    const struct voxels voxels = finest_voxels(volumes, count);
+    return useful_resolution(&voxels, longest);
+}
+
+/* The lattice whose cells are voxels. */
+static bool place_on_voxels(struct medium_lattice *lattice, const struct voxels *voxels,
+                            const double lower[3], const double upper[3], uint64_t max_cells)
+{
+    double first[3], cells[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        first[axis] = floor((lower[axis] - voxels->corner[axis]) / voxels->side + SLIVER);
+        const double end = ceil((upper[axis] - voxels->corner[axis]) / voxels->side - SLIVER);
+        cells[axis] = fmax(end - first[axis], 1.0);
+    }
+    if (max_cells > 0 && cells[0] * cells[1] * cells[2] > (double)max_cells)
+        return false;
+    lattice->cell = (float)voxels->side;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double low = voxels->corner[axis] + first[axis] * voxels->side;
+        lattice->dims[axis] = (int32_t)cells[axis];
+        lattice->lower[axis] = (float)low;
+        lattice->upper[axis] = (float)(low + cells[axis] * voxels->side);
+    }
+    return true;
 }
 
 void medium_place(struct medium_lattice *lattice, struct volume *const *volumes, uint32_t count,
@@ -89,6 +157,12 @@ void medium_place(struct medium_lattice *lattice, struct volume *const *volumes,
     const double longest = joint_bounds(volumes, count, lower, upper, extent);
     /* Also false for a box so small that floats have no cells for it. */
     if (!((float)(longest / resolution) > 0.0f))
+        return;
+    /* Cells as fine as voxels show them best where they lie on them: half a voxel aside, means of
+     * two are interpolated once more. */
+    const struct voxels voxels = finest_voxels(volumes, count);
+    if (voxels.cubes && resolution == useful_resolution(&voxels, longest) &&
+        place_on_voxels(lattice, &voxels, lower, upper, max_cells))
         return;
 
     double cells = set_dims(lattice, extent, longest, resolution);

@@ -415,6 +415,47 @@ static void more_cells_than_voxels_are_of_no_use(void **state)
     field_release(grid);
 }
 
+/* At the useful resolution cells are voxels, wherever the grid lies and whatever its axes are
+ * called; a mesh or a turned grid has no such place. */
+static void cells_as_fine_as_voxels_lie_on_them(void **state)
+{
+    (void)state;
+    const float s = sqrtf(0.5f);
+    const float transforms[3][16] = {
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.317f, -0.21f, 5.03f, 1},
+        {0, 0, -2, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0.317f, -0.21f, 5.03f, 1},
+        {s, s, 0, 0, -s, s, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
+    };
+    brume_grid *grid = noise_make(9, 7, 8, 1);
+    /* Two of its six sides are empty: the lattice begins half a voxel further in there, and its
+     * cells must not. */
+    for (int z = 0; z < 8; ++z)
+        for (int y = 0; y < 7; ++y)
+            grid->data[(z * 7 + y) * 9] = 0.0f;
+    for (int i = 0; i < 63; ++i)
+        grid->data[i] = 0.0f;
+    for (int t = 0; t < 3; ++t) {
+        struct volume *volume = volume_make(grid, &smoke, transforms[t]);
+        struct medium_lattice lattice = build(&volume, 1, medium_useful_resolution(&volume, 1));
+        assert_float_equal(mass(&lattice, lattice.scatter, 0) /
+                               grid_mass(grid, transforms[t], 0), 1.0, 0.01);
+        const float voxel[3] = {4.5f / 9, 3.5f / 9, 5.5f / 9};
+        float world[3];
+        mat4_point(transforms[t], voxel, world);
+        bool on_it = true;
+        for (int axis = 0; axis < 3; ++axis) {
+            const float at = (world[axis] - lattice.lower[axis]) / lattice.cell;
+            on_it = on_it && fabsf(at - floorf(at) - 0.5f) < 1e-3f;
+        }
+        assert_int_equal(on_it, t < 2);
+        if (t < 2)
+            assert_float_equal(lattice.cell, (t == 0 ? 1.0f : 2.0f) / 9, 1e-6f);
+        medium_finish(&lattice);
+        volume_release(volume);
+    }
+    field_release(grid);
+}
+
 static void interpolation_reaches_half_a_voxel_beyond(void **state)
 {
     (void)state;
@@ -854,6 +895,7 @@ int main(void)
         cmocka_unit_test(a_grid_smaller_than_a_cell_keeps_its_mass),
         cmocka_unit_test(a_finer_lattice_interpolates_linearly),
         cmocka_unit_test(more_cells_than_voxels_are_of_no_use),
+        cmocka_unit_test(cells_as_fine_as_voxels_lie_on_them),
         cmocka_unit_test(interpolation_reaches_half_a_voxel_beyond),
         cmocka_unit_test(a_lattice_half_a_cell_off_halves),
         cmocka_unit_test(volumes_add_and_g_is_weighted),

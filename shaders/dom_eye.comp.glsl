@@ -7,12 +7,10 @@
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
-layout(binding = SLOT_MOMENTS) uniform sampler3D light; // w: the cell's mean cosine
-
-layout(binding = SLOT_FIELD) uniform sampler3D field_lattice; // as dom_finish leaves it
+layout(binding = SLOT_MOMENTS) uniform sampler3D light; // w: the cell's mean cosine, or EMPTY
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D scattered_image; // w: 1 where
-                                                                // surfaces cut the cell's links
+                                                                               // nothing scatters
 
 void main()
 {
@@ -30,6 +28,5 @@ void main()
     vec3 sum = vec3(0.0);
     for (int m = 0; m < MOMENTS; ++m)
         sum += bands[band_of(m)] * y[m] * texelFetch(light, above(moment_texel(cell, m)), 0).rgb;
-    vec2 cuts = texelFetch(field_lattice, above(cell + ivec3(3 * level.dims.x, 0, 0)), 0).xy;
-    imageStore(scattered_image, above(cell), fit(max(sum, vec3(0.0)), cuts == vec2(0.0) ? 0.0 : 1.0));
+    imageStore(scattered_image, above(cell), fit(max(sum, vec3(0.0)), g == EMPTY ? 1.0 : 0.0));
 }

@@ -29,7 +29,8 @@ void main()
     if (!in_level(cell) || cell.z >= stage.slab.w)
         return;
     vec3 own[MOMENTS];
-    float g = texelFetch(cell_albedo, cell, 0).w;
+    vec4 scatter = texelFetch(cell_albedo, cell, 0);
+    float g = scatter.rgb == vec3(0.0) ? EMPTY : scatter.w;
     for (int m = 0; m < MOMENTS; ++m) {
         ivec3 texel = moment_texel(cell, m);
         own[m] = texelFetch(moments, texel, 0).rgb;

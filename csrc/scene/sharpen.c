@@ -44,6 +44,12 @@ static void sharpen_lines(const struct lines *lines)
     for (int32_t i = 0; i < count; ++i)
         memcpy(means + (size_t)i * width, lines->values + (size_t)i * lines->stride,
                width * sizeof *means);
+    float apart = 0.0f;
+#pragma omp simd reduction(max : apart)
+    for (size_t i = width; i < all; ++i)
+        apart = larger(apart, larger(means[i] - means[i - width], means[i - width] - means[i]));
+    if (apart == 0.0f)
+        return; /* even all along: where nothing is, and in plain fog */
     memcpy(sharp, means, all * sizeof *sharp);
     memset(fluxes, 0, width * sizeof *fluxes);
     memset(fluxes + all, 0, width * sizeof *fluxes);

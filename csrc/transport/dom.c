@@ -550,6 +550,9 @@ static brume_result make_product(struct transport *transport, const struct trans
     TRY(texture_ensure(memory, &transport->light, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
                        texture_side(MOMENT_SIDE * x), texture_side(MOMENT_SIDE * y),
                        texture_side(z), 1, "moments"));
+    TRY(texture_ensure(memory, &transport->means, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
+                       texture_side(x), texture_side(y), texture_side(z), 1,
+                       "means scattered towards the eye"));
     TRY(texture_ensure(memory, &transport->scattered, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
                        texture_side(x), texture_side(y), texture_side(z), 1,
                        "scattered towards the eye"));
@@ -622,21 +625,33 @@ static uint64_t eye_signature(const struct gpu_frame *frame)
     return hash ? hash : 1;
 }
 
-brume_result dom_look(struct gpu *gpu, struct transport *transport, const struct gpu_frame *frame)
+/* Every cell of all lattices. */
+static brume_result look_through(struct gpu *gpu, struct transport *transport,
+                                 const struct gpu_frame *frame, const char *name)
 {
     const struct program *program;
-    const uint64_t eye = eye_signature(frame);
-    if (transport->eye == eye)
-        return BRUME_OK;
-    TRY(program_compute(&gpu->programs, "dom_eye", &program));
-    glBindTextureUnit(SLOT_MOMENTS, transport->light.id);
-    image(SLOT_OUTPUT, &transport->scattered);
+    TRY(program_compute(&gpu->programs, name, &program));
     for (int i = 0; i < frame->field.x; ++i) {
         const ivec4 dims = frame->fields[i].dims;
         glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL, transport->levels[i].id);
         program_dispatch(program, dims.x, dims.y, dims.z);
     }
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    return BRUME_OK;
+}
+
+brume_result dom_look(struct gpu *gpu, struct transport *transport, const struct gpu_frame *frame)
+{
+    const uint64_t eye = eye_signature(frame);
+    if (transport->eye == eye)
+        return BRUME_OK;
+    glBindTextureUnit(SLOT_MOMENTS, transport->light.id);
+    image(SLOT_OUTPUT, &transport->means);
+    TRY(look_through(gpu, transport, frame, "dom_eye"));
+    glBindTextureUnit(SLOT_SCATTERED, transport->means.id);
+    image(SLOT_OUTPUT, &transport->scattered);
+    TRY(look_through(gpu, transport, frame, "dom_between"));
+    glBindTextureUnit(SLOT_SCATTERED, transport->scattered.id);
     transport->eye = eye;
     return BRUME_OK;
 }

@@ -28,8 +28,8 @@ void transport_bind(const struct transport *transport)
 
 uint64_t transport_field_bytes(const struct transport *transport)
 {
-    uint64_t bytes = transport->field.bytes + transport->light.bytes + transport->scattered.bytes +
-                     transport->wall.bytes;
+    uint64_t bytes = transport->field.bytes + transport->light.bytes + transport->means.bytes +
+                     transport->scattered.bytes + transport->wall.bytes;
     for (int i = 0; i < FIELD_LEVELS; ++i)
         bytes += transport->levels[i].bytes;
     return bytes;
@@ -38,6 +38,7 @@ uint64_t transport_field_bytes(const struct transport *transport)
 void transport_forget_moments(struct gpu *gpu, struct transport *transport)
 {
     texture_finish(&gpu->memory, &transport->light);
+    texture_finish(&gpu->memory, &transport->means);
     texture_finish(&gpu->memory, &transport->scattered);
     texture_finish(&gpu->memory, &transport->wall);
     for (int i = 0; i < FIELD_LEVELS; ++i)

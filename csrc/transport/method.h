@@ -17,9 +17,10 @@ struct transport {
     struct texture tau;    /* optical depth to each light over the length of the way, a tile a light */
     struct texture sky[3]; /* the world's light, spherical harmonics a colour */
     struct texture field;  /* light scattered or reflected before, as lpv_finish leaves it */
-    /* DOM: moments of the light that media scatter, what cells scatter of it to the eye, and what
-     * surfaces in cells send out; of so many lattices, one above the other. */
-    struct texture light, scattered, wall;
+    /* DOM: moments of the light that media scatter, what cells scatter of it to the eye, in the mean
+     * and as it is interpolated, and what surfaces in cells send out; of so many lattices, one above
+     * the other. */
+    struct texture light, means, scattered, wall;
     struct buffer levels[FIELD_LEVELS];
     int level_count;
     uint64_t eye;          /* of the eye that `scattered` was last found for, 0: none */

@@ -189,13 +189,24 @@ vec3 field_scatter(vec3 p, vec3 out_direction, float g)
     return max(light.fluence + 3.0 * g * (out_direction * light.flux), vec3(0.0)) / (4.0 * PI);
 }
 
+vec4 scattered_at(gpu_field field, vec3 at)
+{
+    at.z += float(field.dims.w);
+    return textureLod(scattered_lattice, at / vec3(textureSize(scattered_lattice, 0)), 0.0);
+}
+
 // The same as the cells of one of DOM's lattices scatter it, per unit of sigma_s. Where no surface is near
 // the texture's own interpolation does.
 vec3 scattered_in(gpu_field field, vec3 p)
 {
-    vec3 at = clamp((p - field.lower.xyz) / field.lower.w, vec3(0.5), vec3(field.dims.xyz) - 0.5);
-    at.z += float(field.dims.w);
-    vec4 light = textureLod(scattered_lattice, at / vec3(textureSize(scattered_lattice, 0)), 0.0);
+    vec3 at = (p - field.lower.xyz) / field.lower.w;
+    vec3 last = clamp(at, vec3(0.5), vec3(field.dims.xyz) - 0.5);
+    vec4 light = scattered_at(field, last);
+    // Beyond the outermost cells' centres it goes on as before them.
+    for (int beyond = at == last ? 0 : 1; beyond > 0; --beyond) {
+        vec3 before = scattered_at(field, clamp(2.0 * last - at, vec3(0.5), vec3(field.dims.xyz) - 0.5)).rgb;
+        light.rgb = clamp(2.0 * light.rgb - before, vec3(0.0), 2.0 * light.rgb);
+    }
     vec4 sum = vec4(0.0);
     // A loop rather than a branch: software runs through both sides of every branch.
     for (int near = light.w > 0.0 ? 1 : 0; near > 0; --near) {

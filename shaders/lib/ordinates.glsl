@@ -17,6 +17,9 @@ ivec3 ordinate_texel(ivec3 cell, int number)
                       ivec3(0, level.dims.yz);
 }
 
+// The mean cosine of a cell that nothing scatters in.
+const float EMPTY = 2.0;
+
 ivec3 moment_texel_of(gpu_field field, ivec3 cell, int moment)
 {
     return cell + ivec3(moment % MOMENT_SIDE, moment / MOMENT_SIDE, 0) * ivec3(field.dims.xy, 0);

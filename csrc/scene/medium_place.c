@@ -137,6 +137,8 @@ static bool place_on_voxels(struct medium_lattice *lattice, const struct voxels 
         first[axis] = floor((lower[axis] - voxels->corner[axis]) / voxels->side + SLIVER);
         const double end = ceil((upper[axis] - voxels->corner[axis]) / voxels->side - SLIVER);
         cells[axis] = fmax(end - first[axis], 1.0);
+        if (cells[axis] > INT32_MAX)
+            return false;
     }
     if (max_cells > 0 && cells[0] * cells[1] * cells[2] > (double)max_cells)
         return false;

@@ -42,9 +42,10 @@ vec3 texel_power(vec3 p, out vec3 towards)
            light_transmittance(light, p, towards, distance);
 }
 
+// As far aside as links see surfaces: else one through cells' centres would light cells behind it.
 ivec3 cell_at(vec3 p)
 {
-    return ivec3(floor((p - level.lower.xyz) / level.lower.w));
+    return ivec3(floor((p - level.lower.xyz) / level.lower.w + ASIDE));
 }
 
 // Whether a surface cuts the link between two neighbours; far ones are taken to be parted.

@@ -256,6 +256,42 @@ static struct gpu_field whole_field(const struct box *box, int resolution)
     return field;
 }
 
+static bool is_within(const struct box *box, const float lower[3], const float upper[3])
+{
+    bool within = true;
+    for (int i = 0; i < 3; ++i)
+        within = within && lower[i] <= box->lower[i] && box->upper[i] <= upper[i];
+    return within;
+}
+
+/* Where media end within the lattice, as a cube of fog on the ground does, cells end with them: one
+ * that is filled in part is thin all over, and a thick medium's lit side would not be where it is. For
+ * that cells grow or shrink a little, and the lattice may become a cell longer on each side. Not in
+ * rooms, for whose walls the lattice is laid out. */
+static void fit_field(struct gpu_field *field, const struct box *box,
+                      const struct renderer *renderer)
+{
+    const struct medium_textures *medium = &renderer->medium;
+    const struct geometry *geometry = &renderer->geometry;
+    if (!medium->dims[0])
+        return;
+    const struct box fog = {{medium->lower[0], medium->lower[1], medium->lower[2]},
+                            {medium->upper[0], medium->upper[1], medium->upper[2]}};
+    const float cells = floorf(longest(&fog) / field->lower.w + 0.3f);
+    if (cells < 4.0f || longest(&fog) > 0.9f * longest(box) ||
+        is_within(&fog, geometry->solid_lower, geometry->solid_upper))
+        return;
+    const float cell = longest(&fog) / cells;
+    field->lower.w = cell;
+    for (int i = 0; i < 3; ++i) {
+        const float before = ceilf((fog.lower[i] - box->lower[i]) / cell - 0.01f);
+        const float lower = fog.lower[i] - before * cell;
+        const float needed = ceilf((box->upper[i] - lower) / cell - 0.01f);
+        (&field->lower.x)[i] = lower;
+        (&field->dims.x)[i] = needed < 1.0f ? 1 : (int)needed;
+    }
+}
+
 /* The point that finer lattices surround: of a box this long, before a camera near its side. */
 static void focus_of(const struct renderer *renderer, const struct render_request *request,
                      float length, float focus[3])
@@ -312,6 +348,7 @@ static int layout_field(struct renderer *renderer, const struct render_request *
     frame->field.x = settings->cascades;
     for (;; resolution = resolution * 3 / 4) {
         frame->fields[0] = whole_field(&box, resolution);
+        fit_field(&frame->fields[0], &box, renderer);
         for (int i = 1; i < frame->field.x; ++i) {
             float focus[3];
             focus_of(renderer, request, ldexpf(longest(&box), -i), focus);

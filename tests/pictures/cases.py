@@ -102,20 +102,19 @@ CASES = {case.name: case for case in (
     Case('environment', (), 0.04, 1024, change='turned_as_point', groups=ROUND),
     Case('environment', (), 0.04, 1024, change='turned_as_texture', groups=ROUND),
     Case('cube', (), 0.05, 512, zoom=1.4, method='LPV'),
-    Case('cloud', (), 0.07, 512, zoom=1.15, method='LPV'),
+    Case('cloud', (), 0.05, 512, zoom=1.15, method='LPV'),
     Case('room', (), 0.10, 2048, method='LPV'),
     Case('room_smoke', (), 0.10, 1024, method='LPV'),
-    Case('cube', (), 0.04, 512, zoom=1.4, method='DOM'),
-    Case('cloud', (), 0.04, 512, zoom=1.15, method='DOM'),
+    Case('cube', (), 0.02, 512, zoom=1.4, method='DOM'),
+    Case('cloud', (), 0.03, 512, zoom=1.15, method='DOM'),
     Case('room', (), 0.10, 2048, method='DOM'),
     Case('room_smoke', (), 0.10, 1024, method='DOM'),
-    Case('cube', (), 0.04, 256, zoom=1.4, change='isotropic', method='DOM', medium_only=True),
+    Case('cube', (), 0.03, 256, zoom=1.4, change='isotropic', method='DOM', medium_only=True),
     Case('cube', (), 0.05, 1024, zoom=1.4, change='forward', method='DOM', medium_only=True),
-    # White media of this thickness scatter a tenth of their light more often than 64 times. The
-    # floor beyond DOM's lattice neither hides the sky from these two nor lights them.
-    Case('cube', (), 0.10, 256, zoom=1.4, change='milk', method='DOM', medium_only=True,
+    # White media of this thickness scatter a tenth of their light more often than 64 times.
+    Case('cube', (), 0.08, 256, zoom=1.4, change='milk', method='DOM', medium_only=True,
          bounces=1024),
-    Case('plume', (), 0.10, 256, zoom=1.6, method='DOM', medium_only=True),
-    Case('smoke_sky', (), 0.08, 768, method='DOM', medium_only=True),
+    Case('plume', (), 0.08, 256, zoom=1.6, method='DOM', medium_only=True),
+    Case('smoke_sky', (), 0.06, 768, method='DOM', medium_only=True),
     Case('lantern', (), 0.08, 1024, method='DOM', medium_only=True),
 )}

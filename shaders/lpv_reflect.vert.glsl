@@ -42,10 +42,11 @@ vec3 texel_power(vec3 p, out vec3 towards)
            light_transmittance(light, p, towards, distance);
 }
 
-// As far aside as links see surfaces: else one through cells' centres would light cells behind it.
-ivec3 cell_at(vec3 p)
+// Along the surface's normal as far aside as links see it: else one through cells' centres would light
+// cells behind it.
+ivec3 cell_at(vec3 p, vec3 normal)
 {
-    return ivec3(floor((p - level.lower.xyz) / level.lower.w + ASIDE));
+    return ivec3(floor((p - level.lower.xyz) / level.lower.w + ASIDE * abs(normal)));
 }
 
 // Whether a surface cuts the link between two neighbours; far ones are taken to be parted.
@@ -75,9 +76,9 @@ void main()
     if (dot(axis, towards) < 0.0)
         axis = -axis; // both sides of a surface are the same
     float reach = 0.5 * level.lower.w * (abs(axis.x) + abs(axis.y) + abs(axis.z));
-    ivec3 cell = cell_at(p + axis * reach);
+    ivec3 cell = cell_at(p + axis * reach, axis);
     // In a wedge's tip the other wall may be nearer than that. Towards the light nothing is.
-    ivec3 towards_light = cell_at(p + towards * (reach / max(dot(axis, towards), 0.5)));
+    ivec3 towards_light = cell_at(p + towards * (reach / max(dot(axis, towards), 0.5)), axis);
     if (is_parted(cell, towards_light))
         cell = towards_light;
     if (!in_level(cell))

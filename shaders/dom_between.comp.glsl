@@ -5,23 +5,16 @@
 // medium's border their light falls as steeply as before it.
 #version 450 core
 #include "lib/ordinates.glsl"
-#include "lib/cuts.glsl"
+#include "lib/field.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
-layout(binding = SLOT_SCATTERED) uniform sampler3D scattered; // w: as dom_eye leaves it
-layout(binding = SLOT_FIELD) uniform sampler3D field_lattice; // as dom_finish leaves it
+// scattered_lattice is as dom_eye leaves it: w: 1 where nothing scatters.
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D between_image; // w: 1 where surfaces
                                                                              // cut the cell's links
 
 const float SHARE = 0.125;
-
-uint cuts_at(ivec3 cell)
-{
-    vec2 sides = texelFetch(field_lattice, above(cell + ivec3(3 * level.dims.x, 0, 0)), 0).xy;
-    return uint(sides.x) | uint(sides.y) << 13;
-}
 
 // What the next cell scatters, w: 1; w: 0 where it does not, or a surface parts it from this one.
 vec4 beside(ivec3 cell, uint cuts, ivec3 offset)
@@ -29,7 +22,7 @@ vec4 beside(ivec3 cell, uint cuts, ivec3 offset)
     ivec3 next = cell + offset;
     if (!in_level(next) || is_cut(cuts, offset))
         return vec4(0.0);
-    vec4 light = texelFetch(scattered, above(next), 0);
+    vec4 light = texelFetch(scattered_lattice, above(next), 0);
     return light.w == 0.0 ? vec4(light.rgb, 1.0) : vec4(0.0);
 }
 
@@ -54,7 +47,7 @@ vec3 gone_on(ivec3 cell, uint cuts)
         vec4 first = i == 13 ? vec4(0.0) : beside(cell, cuts, offset);
         if (first.w == 0.0)
             continue;
-        vec4 second = beside(cell + offset, cuts_at(cell + offset), offset);
+        vec4 second = beside(cell + offset, cuts_of(level, cell + offset), offset);
         vec3 light = mix(first.rgb, clamp(2.0 * first.rgb - second.rgb, vec3(0.0), 2.0 * first.rgb),
                          second.w);
         sum += vec4(light, 1.0) * inversesqrt(float(dot(offset, offset)));
@@ -67,8 +60,8 @@ void main()
     ivec3 cell = ivec3(gl_GlobalInvocationID);
     if (!in_level(cell))
         return;
-    vec4 mean = texelFetch(scattered, above(cell), 0);
-    uint cuts = cuts_at(cell);
+    vec4 mean = texelFetch(scattered_lattice, above(cell), 0);
+    uint cuts = cuts_of(level, cell);
     // Loops rather than branches: software runs through both sides of every branch.
     vec3 light = vec3(0.0);
     for (int scatters = mean.w == 0.0 ? 1 : 0; scatters > 0; --scatters)

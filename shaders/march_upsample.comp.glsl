@@ -15,8 +15,6 @@ layout(binding = SLOT_HALF) uniform sampler2DArray half_march;
 // silhouette's own plane holds what is behind it. Two pixels' spacing off is far.
 float likeness(pixel_view view, march_end own, ivec2 pixel, float t, bool leaves, float spacing)
 {
-    if (t <= NO_DEPTH)
-        return 0.0;
     if (own.leaves && leaves)
         return 1.0;
     float off = t - own.t;
@@ -53,7 +51,6 @@ bool upsample(ivec2 pixel, pixel_view view, march_end own, out march_state state
     ivec2 low = ivec2(floor(at));
     vec2 f = at - vec2(low);
     float sum = 0.0;
-    bool missed = false;
     for (int corner = 0; corner < 4; ++corner) {
         ivec2 side = ivec2(corner & 1, corner >> 1);
         vec2 each = mix(1.0 - f, f, vec2(side));
@@ -63,7 +60,10 @@ bool upsample(ivec2 pixel, pixel_view view, march_end own, out march_state state
         ivec2 block = clamp(low + side, ivec2(0), block_count() - 1);
         vec4 direct = texelFetch(half_march, ivec3(block, HALF_DIRECT), 0);
         vec4 indirect = texelFetch(half_march, ivec3(block, HALF_INDIRECT), 0);
-        missed = missed || direct.w <= NO_DEPTH;
+        // By a silhouette of the media's box rays beside miss it and tell nothing; the others alone have
+        // come further through the media than the pixel's.
+        if (direct.w <= NO_DEPTH)
+            return false;
         weight *= likeness(view, own, block_pixel(block), direct.w, indirect.w != 0.0, spacing);
         if (weight == 0.0)
             continue;
@@ -76,9 +76,7 @@ bool upsample(ivec2 pixel, pixel_view view, march_end own, out march_state state
         state.emission += weight * texelFetch(half_march, ivec3(block, HALF_EMISSION), 0).rgb;
         state.transmittance += weight * min(through.rgb * exp(rest), vec3(1.0));
     }
-    // By a silhouette of the media's box rays beside miss it and tell nothing; the others alone have come
-    // further through the media than the pixel's.
-    if (missed || sum < 0.05)
+    if (sum < 0.05)
         return false;
     state.direct /= sum;
     state.indirect /= sum;

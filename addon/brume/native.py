@@ -231,7 +231,7 @@ _FUNCTIONS = {
     "brume_device_describe": (_RESULT, [c_void_p, POINTER(DeviceInfo)]),
     "brume_vdb_list": (_RESULT, [c_char_p, POINTER(GridInfo), c_uint32, POINTER(c_uint32)]),
     "brume_grid_load_vdb": (_RESULT, [c_char_p, c_char_p, c_uint64, c_uint32,
-                                        POINTER(c_void_p)]),
+                                     POINTER(c_void_p)]),
     "brume_grid_create": (_RESULT, [c_char_p, Dims, c_int32, c_void_p, Mat4, POINTER(c_void_p)]),
     "brume_grid_describe": (_RESULT, [c_void_p, POINTER(GridInfo)]),
     "brume_grid_release": (None, [c_void_p]),

@@ -513,5 +513,6 @@ brume_result vdb_load(const char *path, const char *name, uint64_t max_voxels, b
                       brume_grid **out)
 {
     REQUIRE(path && name && out);
-    return guarded(path, [&] { *out = load(path, name, max_voxels, at_corner ? CORNERS : CENTRES); });
+    const double corner = at_corner ? CORNERS : CENTRES;
+    return guarded(path, [&] { *out = load(path, name, max_voxels, corner); });
 }

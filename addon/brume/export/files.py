@@ -40,6 +40,11 @@ def grid_infos(path):
     return {info.name.decode(errors="replace"): info for info in vdb_list(path)}
 
 
+def load_grid(path, name):
+    """A grid of a file, where the engines of this Blender show it."""
+    return Grid.load_vdb(path, name, at_corner=VOXELS_AT_CORNERS)
+
+
 class File:
     """A .vdb file as it was at one time: its list of grids, and those that were read."""
 
@@ -55,7 +60,7 @@ class File:
             self.infos = grid_infos(self.path)
         for name in names:
             if name in self.infos and name not in self.grids:
-                self.grids[name] = Grid.load_vdb(self.path, name, at_corner=VOXELS_AT_CORNERS)
+                self.grids[name] = load_grid(self.path, name)
 
     def has(self, names):
         return self.infos is not None and all(

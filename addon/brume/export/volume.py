@@ -12,11 +12,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..compat import VOXELS_AT_CORNERS, identity
-from ..native import BrumeError, Grid, vdb_list
+from ..compat import identity
+from ..native import BrumeError, vdb_list
 from . import material as materials
 from . import nodes
-from .files import grid_infos
+from .files import grid_infos, load_grid
 from .volume_shader import compile_volume, default_program
 
 
@@ -69,8 +69,7 @@ class _Scratch:
         self.infos = grid_infos(path)
 
     def grids(self, names):
-        return [self.target.grid((*self.stamp, name), partial(Grid.load_vdb, self.path, name,
-                                                              at_corner=VOXELS_AT_CORNERS))
+        return [self.target.grid((*self.stamp, name), partial(load_grid, self.path, name))
                 for name in names]
 
 

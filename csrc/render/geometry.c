@@ -257,7 +257,8 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
                               .corner_count = 3 * (end - first),
                               .first_instance = first_instance,
                               .instance_count = instance_count,
-                              .visibility = set->visibility};
+                              .visibility = set->visibility,
+                              .opaque = 1};
         memcpy(draw->lower, lower, sizeof draw->lower);
         memcpy(draw->upper, upper, sizeof draw->upper);
         const struct entry *entry = table_find(materials, mesh->materials[slot]);
@@ -269,7 +270,8 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
         draw->material = (uint32_t)(entry - materials->entries) + 1;
         draw->base_image = base ? base->texture.id : 0;
         draw->roughness_image = rough ? rough->texture.id : 0;
-        draw->tinted = material->alpha_mode != BRUME_ALPHA_OPAQUE &&
+        draw->opaque = material->alpha_mode == BRUME_ALPHA_OPAQUE;
+        draw->tinted = !draw->opaque &&
                        (material->transparent[0] != 1.0f || material->transparent[1] != 1.0f ||
                         material->transparent[2] != 1.0f);
     }
@@ -445,14 +447,14 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
     static const char *const stems[] = {
         [GEOMETRY_GBUFFER] = "gbuffer", [GEOMETRY_SHADOW] = "shadow", [GEOMETRY_TINT] = "tint",
         [GEOMETRY_LINKS] = "links",     [GEOMETRY_REFLECT] = "reflect"};
-    const struct program *program;
+    const struct program *program, *opaque;
     TRY(program_draw(&gpu->programs, stems[pass], &program));
+    TRY(program_draw(&gpu->programs, pass == GEOMETRY_SHADOW ? "shadow_opaque" : stems[pass], &opaque));
     TRY(buffer_update(&gpu->memory, &geometry->stage_block, FOR_TARGET, sizeof *stage, stage,
                       "draw stage"));
     glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_STAGE, geometry->stage_block.id);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_INSTANCES, geometry->instances.id);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_MATERIALS, geometry->materials.id);
-    glUseProgram(program->id);
     glBindVertexArray(geometry->vertex_array);
     glVertexArrayVertexBuffer(geometry->vertex_array, 1, geometry->instance_numbers.id, 0, 4);
     glEnable(GL_DEPTH_TEST);
@@ -468,6 +470,7 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
             (pass == GEOMETRY_TINT && !draw->tinted) ||
             is_outside(draw, &stage->clip_from_world))
             continue;
+        glUseProgram(draw->opaque ? opaque->id : program->id);
         glVertexArrayVertexBuffer(geometry->vertex_array, 0, draw->corners, 0, 32);
         glBindTextureUnit(SLOT_MATERIAL_BASE, draw->base_image);
         glBindTextureUnit(SLOT_MATERIAL_ROUGHNESS, draw->roughness_image);

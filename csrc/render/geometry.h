@@ -29,6 +29,7 @@ struct draw {
     uint32_t material;
     uint32_t visibility;
     int tinted; /* colours what is seen through it */
+    int opaque; /* all of it covers what is behind */
 };
 
 struct geometry {

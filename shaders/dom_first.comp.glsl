@@ -41,8 +41,8 @@ void add_point(inout vec3 q[MOMENTS], vec3 p, float part, uint lot)
     sigma_s *= 1.0 - forward_share(g);
     vec4 bands = scaled_bands(g);
     for (uint i = 0u; i < frame.counts.x; ++i) {
-        gpu_light light = lights[i];
-        gpu_light_sample s = light_samples[light.samples.x + lot % light.samples.y];
+        gpu_light light = light_at(i);
+        gpu_light_sample s = light_sample_at(light.samples.x + lot % light.samples.y);
         vec3 towards;
         float distance;
         vec3 intensity = light_in_cube(light, s, p, part, towards, distance);

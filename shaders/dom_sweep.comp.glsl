@@ -8,60 +8,21 @@
 #version 450 core
 #include "lib/ordinates.glsl"
 
-layout(local_size_x = 4 * GROUP_PIXELS, local_size_y = GROUP_PIXELS) in;
+layout(local_size_x = GROUP_PIXELS * GROUP_PIXELS) in;
 
-// Number of the slice, from where light enters; first ordinate; their major axis; 1: the world's own
-// light on its way into the lattice, 2: also that of surfaces around it, 0: light from sources in it.
+// Number of the slice, from where light enters; first ordinate; their major axis; 1: light on its way into
+// the lattice alone, 0: of sources in it.
 layout(location = 0) uniform ivec4 pass;
-// The lattice around, -1: none; how many tiles of ordinates stand along z in its textures.
-layout(location = 1) uniform ivec2 around;
 
 layout(binding = SLOT_CELL_EXTINCT) uniform sampler3D cell_extinct;
 layout(binding = SLOT_CUTS) uniform usampler3D cell_cuts;
 layout(binding = SLOT_CELL_WALLS) uniform sampler3D cell_walls; // radiance
 layout(binding = SLOT_ANGULAR) uniform sampler3D sources;       // w: 1 where there is a medium
 layout(binding = SLOT_SLICE) uniform sampler3D slice_before;
-layout(binding = SLOT_MEANS_AROUND) uniform sampler3D means_around;
-layout(binding = SLOT_SURROUNDINGS) uniform sampler2DArray surroundings;
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D mean_image;
 layout(binding = SLOT_OUTPUT + 1, rgba16f) writeonly uniform image3D slice_image;
 layout(binding = SLOT_OUTPUT + 2, rgba16f) writeonly uniform image3D hits_image;
-
-// Software runs through both sides of every branch, but not through loops that nobody enters: what is
-// seldom needed stands in loops.
-
-// Radiance that comes from a cell beyond the lattice's side: of the lattice around, or of the world and of
-// surfaces there.
-vec3 outside(ivec3 cell, int number)
-{
-    vec3 light = ordinates.list[number].world.rgb * float(min(pass.w, 1));
-    for (int i = pass.w; i == 2; i = 0) {
-        vec4 p = vec4(cell_centre(level, cell), 1.0);
-        vec2 at = vec2(dot(p, ordinates.list[number].map_u), dot(p, ordinates.list[number].map_v));
-        light = textureLod(surroundings, vec3(at, number), 0.0).rgb;
-    }
-    for (int i = around.x; i >= 0; i = -1) {
-        gpu_field field = frame.fields[i];
-        vec3 at = (cell_centre(level, cell) - field.lower.xyz) / field.lower.w;
-        if (any(lessThan(at, vec3(0.0))) || any(greaterThan(at, vec3(field.dims.xyz))))
-            continue;
-        at = clamp(at, vec3(0.5), vec3(field.dims.xyz) - 0.5);
-        at.yz += vec2(number / around.y, number % around.y) * vec2(field.dims.yz);
-        light = textureLod(means_around, at / vec3(textureSize(means_around, 0)), 0.0).rgb;
-    }
-    return light;
-}
-
-// Radiance on its way into a cell by one of the four ways.
-vec3 comes_from(int axis, int along, ivec2 from, ivec2 sides, int number)
-{
-    ivec2 within = clamp(from, ivec2(0), sides - 1);
-    vec3 light = texelFetch(slice_before, ivec3(within, number), 0).rgb;
-    for (int i = pass.x > 0 && from == within ? 1 : 0; i < 1; ++i)
-        light = outside(placed(axis, along, from), number);
-    return light;
-}
 
 // How much the source grows along the way through a cell, from the cells around.
 vec3 growth(bool wanted, ivec3 cell, int number, vec3 way, vec4 own, uint cuts)
@@ -84,9 +45,9 @@ vec3 growth(bool wanted, ivec3 cell, int number, vec3 way, vec4 own, uint cuts)
 void main()
 {
     int axis = pass.z, number = pass.y + int(gl_WorkGroupID.z);
-    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
-    ivec3 dims = axis == 0 ? level.dims.xyz : (axis == 1 ? level.dims.yzx : level.dims.zxy);
-    if (any(greaterThanEqual(at, dims.yz)))
+    ivec3 dims = slice_dims(axis);
+    ivec2 at = divided(int(gl_GlobalInvocationID.x), dims.y).yx;
+    if (at.y >= dims.z)
         return;
     vec3 direction = ordinates.list[number].direction.xyz;
     vec3 way = turned(axis, direction);
@@ -96,20 +57,15 @@ void main()
 
     vec2 aside = abs(way.yz) * long_;
     ivec2 turn = ivec2(sign(way.yz));
-    vec3 enters = vec3(0.0);
     vec4 shares = vec4(1.0 - aside.x, aside.x, 1.0 - aside.x, aside.x) *
                   vec4(1.0 - aside.yy, aside.yy);
-    int before = (way.x > 0.0 ? pass.x : dims.x - 1 - pass.x) - int(sign(way.x));
-    for (int i = 0; i < 4; ++i)
-        enters += shares[i] * comes_from(axis, before, at - turn * aside_of(i), dims.yz, number);
+    vec3 wall = texelFetch(cell_walls, cell, 0).rgb, enters = vec3(0.0);
     float stopped = 0.0;
-    for (int i = cuts != 0u ? 0 : 4; i < 4; ++i) {
-        if ((cuts & ordinates.list[number].links_in[i]) != 0u) {
-            vec3 comes = comes_from(axis, before, at - turn * aside_of(i), dims.yz, number);
-            enters += shares[i] * (texelFetch(cell_walls, cell, 0).rgb - comes);
-        }
-        if ((cuts & ordinates.list[number].links_out[i]) != 0u)
-            stopped += shares[i];
+    for (int i = 0; i < 4; ++i) {
+        vec3 comes = texelFetch(slice_before, slice_texel(at - turn * aside_of(i), number), 0).rgb;
+        bool cut = (cuts & ordinates.list[number].links_in[i]) != 0u;
+        enters += shares[i] * (cut ? wall : comes);
+        stopped += (cuts & ordinates.list[number].links_out[i]) != 0u ? shares[i] : 0.0;
     }
     enters = pass.w != 0 ? max(enters, vec3(0.0)) : enters;
 
@@ -126,8 +82,8 @@ void main()
     vec3 mean = mix(source.rgb + (enters - leaves) / max(depth, vec3(1e-6)),
                     enters * (1.0 - 0.5 * depth) + source.rgb * (0.5 * depth),
                     lessThan(depth, vec3(3e-3)));
-    imageStore(slice_image, ivec3(at, number), fit_along(leaves, 0.0, cell, number));
+    imageStore(slice_image, slice_texel(at, number), fit_along(leaves, 0.0, cell, number));
     imageStore(mean_image, ordinate_texel(cell, number), fit_along(mean, 0.0, cell, number));
-    for (int i = cuts != 0u && pass.w == 0 ? 0 : 1; i < 1; ++i)
+    if (cuts != 0u && pass.w == 0)
         imageStore(hits_image, ordinate_texel(cell, number), fit(leaves * stopped, stopped));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What iterations begin with, of a lattice of the last run: its light at the cells that are within it,
-// less the world's own as it is now, and the radiance of surfaces.
+// What iterations begin with, of the lattice around or one of the last run: its light at the cells that
+// are within it, without the world's own, and the radiance of surfaces.
 #version 450 core
 #include "lib/ordinates.glsl"
 
@@ -8,7 +8,8 @@ layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GR
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
-    gpu_lattice_pass stage; // offset.x: 1: the world's own light is known
+    gpu_lattice_pass stage; // offset.x: 1: the world's own light, as it is now, is in it; y: 1: all
+                            // lattices stand one above the other
 };
 
 layout(std140, binding = SLOT_LEVEL_BEFORE) uniform before_block
@@ -17,7 +18,7 @@ layout(std140, binding = SLOT_LEVEL_BEFORE) uniform before_block
 };
 
 layout(binding = SLOT_CUTS) uniform usampler3D cell_cuts;
-layout(binding = SLOT_ANGULAR) uniform sampler3D light; // moments, before
+layout(binding = SLOT_ANGULAR) uniform sampler3D light; // moments
 layout(binding = SLOT_CELL_WALLS) uniform sampler3D walls;
 layout(binding = SLOT_MOMENTS) uniform sampler3D world_moments;
 
@@ -33,7 +34,7 @@ void main()
     ivec3 nearest = ivec3(floor(at)), low = ivec3(floor(at - 0.5));
     if (!in_field(before, nearest))
         return;
-    ivec3 stands = ivec3(0, 0, before.dims.w); // one above the other
+    ivec3 stands = ivec3(0, 0, before.dims.w * stage.offset.y);
     vec3 f = at - 0.5 - vec3(low), sums[MOMENTS];
     for (int m = 0; m < MOMENTS; ++m)
         sums[m] = vec3(0.0);

@@ -34,9 +34,9 @@ void main()
     mat4 m = stage.clip_from_world;
     float area = stage.scale.x * stage.scale.x; // across the way to the eye
     vec3 towards = normalize(vec3(m[0].z, m[1].z, m[2].z)); // depth is reversed
-    if (stage.what.x >= 0 && lights[stage.what.x].info.x != uint(LIGHT_SUN)) {
-        vec3 way = light_samples[stage.what.y].position.xyz - p;
-        if (shadow_face(lights[stage.what.x], -way) != stage.what.z)
+    if (stage.what.x >= 0 && light_at(stage.what.x).info.x != uint(LIGHT_SUN)) {
+        vec3 way = light_sample_at(stage.what.y).position.xyz - p;
+        if (shadow_face(light_at(stage.what.x), -way) != stage.what.z)
             return; // faces reach a little into one another
         float distance = length(way);
         float cosine = (m * vec4(p, 1.0)).w / distance;

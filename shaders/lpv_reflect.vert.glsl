@@ -21,14 +21,14 @@ flat out vec3 axis;
 // Power that the light sends through a texel, W.
 vec3 texel_power(vec3 p, out vec3 towards)
 {
-    gpu_light_sample s = light_samples[stage.what.y];
+    gpu_light_sample s = light_sample_at(stage.what.y);
     float area = stage.scale.x * stage.scale.x;
     if (stage.what.x < 0) {
         towards = s.position.xyz;
         return s.weight.rgb * area *
                distant_transmittance(p, towards, 2.0 * frame.medium_lower.w, 0.5);
     }
-    gpu_light light = lights[stage.what.x];
+    gpu_light light = light_at(stage.what.x);
     float square;
     vec3 intensity = light_intensity(light, s.position.xyz, p, towards, square) * light.factors.x;
     if (light.info.x == uint(LIGHT_SUN))

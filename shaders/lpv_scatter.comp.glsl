@@ -41,8 +41,8 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
     if (sigma_s == vec3(0.0))
         return;
     for (uint i = 0u; i < frame.counts.x; ++i) {
-        gpu_light light = lights[i];
-        gpu_light_sample s = light_samples[light.samples.x + lot % light.samples.y];
+        gpu_light light = light_at(i);
+        gpu_light_sample s = light_sample_at(light.samples.x + lot % light.samples.y);
         vec3 towards;
         float distance;
         vec3 intensity = light_in_cube(light, s, p, part, towards, distance);

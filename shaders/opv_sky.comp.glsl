@@ -29,7 +29,7 @@ void main()
     uint every = max(frame.world.y / SKY_SAMPLES, 1u);
     uint start = hash(uint(node.x) + hash(uint(node.y) + hash(uint(node.z)))) % every;
     for (uint i = start; i < frame.world.y; i += every) {
-        gpu_light_sample s = light_samples[frame.world.x + i];
+        gpu_light_sample s = light_sample_at(frame.world.x + i);
         vec3 towards = s.position.xyz;
         int number = int(s.position.w);
         if (number >= 0 && distant_shadow_medium(number, frame.world.w, p) == 0.0)

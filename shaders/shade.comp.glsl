@@ -20,7 +20,7 @@ vec3 light_surface(surface s, vec3 p, gpu_light light, ivec2 pixel, uint number)
 {
     // Each pixel walks through all samples of the light, from a start of its own.
     uint turn = (uint(frame.size.z) + pixel_hash(pixel, number)) % light.samples.y;
-    gpu_light_sample light_sample = light_samples[light.samples.x + turn];
+    gpu_light_sample light_sample = light_sample_at(light.samples.x + turn);
     vec2 lot = vec2(pixel_random(pixel, 2u * number + 101u),
                     pixel_random(pixel, 2u * number + 102u)) * 2.0 - 1.0;
     vec3 point = light_point(light, light_sample, lot);
@@ -64,7 +64,7 @@ vec3 world_diffuse(surface s, vec3 p, ivec2 pixel, float within)
     uint first = uint(frame.size.z) * frame.world.z % taken;
     for (uint i = 0u; i < frame.world.z; ++i) {
         uint turn = (start % frame.world.y + every * ((first + i) * stride % taken)) % frame.world.y;
-        gpu_light_sample w = light_samples[frame.world.x + turn];
+        gpu_light_sample w = light_sample_at(frame.world.x + turn);
         vec3 reflected = bsdf_diffuse(s, w.position.xyz);
         if (reflected == vec3(0.0))
             continue;
@@ -84,14 +84,14 @@ float world_visible(vec3 p, vec3 normal, vec3 direction, vec3 lot)
     float best = -2.0;
     uint nearest = 0u;
     for (uint i = 0u; i < frame.world.y; ++i) {
-        vec3 towards = light_samples[frame.world.x + i].position.xyz;
+        vec3 towards = light_sample_at(frame.world.x + i).position.xyz;
         float nearness = dot(around, towards);
         if (nearness > best && dot(normal, towards) > 0.0) {
             best = nearness;
             nearest = i;
         }
     }
-    return best > -2.0 ? world_shadow(light_samples[frame.world.x + nearest], p, normal) : 1.0;
+    return best > -2.0 ? world_shadow(light_sample_at(frame.world.x + nearest), p, normal) : 1.0;
 }
 
 // One direction of the lobe a sample; the image is blurred by what the samples leave between them
@@ -153,7 +153,7 @@ void main()
         s.specular = texelFetch(gbuffer_specular, pixel, 0).rgb;
         vec3 p = ray.origin + ray.direction * (normal_depth.w * ray.stretch);
         for (uint i = 0u; i < frame.counts.x; ++i)
-            radiance += light_surface(s, p, lights[i], pixel, i);
+            radiance += light_surface(s, p, light_at(i), pixel, i);
         if (frame.world.y > 0u && frame.fog_upper.w == 0.0) {
             float within = pixel_random(pixel, 8u);
             radiance += world_diffuse(s, p, pixel, within) + world_specular(s, p, pixel, within);

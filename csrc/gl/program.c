@@ -158,14 +158,23 @@ brume_result shader_load(const char *folder, const char *name, char **text)
 static brume_result compile(struct program_cache *cache, GLuint program, GLenum type,
                             const char *stem, const char *suffix)
 {
-    char name[96];
-    snprintf(name, sizeof name, "%s.%s.glsl", stem, suffix);
+    char name[96], variant[64] = "";
+    const char *colon = strchr(stem, ':');
+    snprintf(name, sizeof name, "%.*s.%s.glsl", colon ? (int)(colon - stem) : (int)strlen(stem),
+             stem, suffix);
+    if (colon)
+        snprintf(variant, sizeof variant, "#define %s\n", colon + 1);
     struct includes includes = {.folder = cache->folder};
     char *text = NULL;
     TRY(load(&includes, name, &text));
     const GLuint shader = glCreateShader(type);
-    const char *source = text;
-    glShaderSource(shader, 1, &source, NULL);
+    /* Nothing but comments may stand before #version. */
+    const char *version = strstr(text, "#version");
+    const char *rest = version ? strchr(version, '\n') : NULL;
+    rest = rest ? rest + 1 : text;
+    const char *parts[] = {text, variant, rest};
+    const GLint lengths[] = {(GLint)(rest - text), (GLint)strlen(variant), (GLint)strlen(rest)};
+    glShaderSource(shader, 3, parts, lengths);
     glCompileShader(shader);
     free(text);
     GLint compiled = 0;

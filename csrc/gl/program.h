@@ -9,7 +9,7 @@
 
 #include <epoxy/gl.h>
 
-#define PROGRAM_MAX 48
+#define PROGRAM_MAX 64
 
 struct program {
     char name[48];
@@ -28,7 +28,8 @@ brume_result program_cache_init(struct program_cache *cache, const char *shader_
 void program_cache_finish(struct program_cache *cache);
 
 /* The compute program <stem>.comp.glsl, or the drawing program <stem>.vert.glsl with
- * <stem>.frag.glsl; compiled at first use. */
+ * <stem>.frag.glsl; compiled at first use. "stem:NAME" is its variant in which NAME is defined; a
+ * line "// variants: NAME" in the file tells which there are. */
 brume_result program_compute(struct program_cache *cache, const char *stem,
                              const struct program **out);
 brume_result program_draw(struct program_cache *cache, const char *stem,

@@ -187,7 +187,6 @@ static void set_paths(struct run *run)
     run->renderer->frame.paths = (ivec4){
         .x = all || sum || paths == BRUME_PATHS_SINGLE,
         .y = all || sum || paths == BRUME_PATHS_REFLECTED_MARCHED,
-        .z = settings->method == BRUME_METHOD_DOM,
     };
 }
 
@@ -291,7 +290,8 @@ static brume_result work_march(struct run *run)
 {
     const vec4 march = run->renderer->frame.march;
     const struct render_request *request = run->request;
-    return view_march(run->gpu, request->targets, &request->view, (int)march.z, (int)march.w);
+    return view_march(run->gpu, request->targets, &request->view,
+                      request->settings.method == BRUME_METHOD_DOM, (int)march.z, (int)march.w);
 }
 
 /* Reads the mean of the samples so far and makes it the newest picture. */
@@ -347,7 +347,7 @@ static brume_result bind_view(struct run *run, int end)
     shadows_bind(&renderer->shadows);
     transport_bind(&renderer->transport);
     TRY(bind_frame(run));
-    if (renderer->frame.paths.z != 0 && renderer->frame.field.x != 0)
+    if (run->request->settings.method == BRUME_METHOD_DOM && renderer->frame.field.x != 0)
         TRY(dom_look(run->gpu, &renderer->transport, &renderer->frame));
     view_bind(request->targets); /* last: images are the others' too */
     return BRUME_OK;

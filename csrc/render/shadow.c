@@ -263,6 +263,13 @@ brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snap
     return BRUME_OK;
 }
 
+static void read_as_texels(GLuint *texture, const struct buffer *buffer, GLenum format)
+{
+    if (!*texture)
+        glCreateTextures(GL_TEXTURE_BUFFER, 1, texture);
+    glTextureBuffer(*texture, format, buffer->id);
+}
+
 brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows)
 {
     struct memory *memory = &gpu->memory;
@@ -274,6 +281,9 @@ brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows)
     TRY(buffer_update(memory, &shadows->view_buffer, FOR_SHADOW,
                       shadows->view_count * sizeof *shadows->views, shadows->views,
                       "shadow views"));
+    read_as_texels(&shadows->light_texture, &shadows->light_buffer, GL_RGBA32UI);
+    read_as_texels(&shadows->sample_texture, &shadows->sample_buffer, GL_RGBA32F);
+    read_as_texels(&shadows->view_texture, &shadows->view_buffer, GL_RGBA32F);
     /* A sampler wants a texture, even where nothing casts a shadow. */
     const int layers = shadows->view_count ? (int)shadows->layer_count : 1;
     const int side = shadows->view_count ? shadows->side : 1;
@@ -370,9 +380,9 @@ brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geo
 
 void shadows_bind(const struct shadows *shadows)
 {
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_LIGHTS, shadows->light_buffer.id);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_LIGHT_SAMPLES, shadows->sample_buffer.id);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_SHADOW_VIEWS, shadows->view_buffer.id);
+    glBindTextureUnit(SLOT_LIGHTS, shadows->light_texture);
+    glBindTextureUnit(SLOT_LIGHT_SAMPLES, shadows->sample_texture);
+    glBindTextureUnit(SLOT_SHADOW_VIEWS, shadows->view_texture);
     glBindTextureUnit(SLOT_SHADOW, shadows->maps.id);
 }
 
@@ -382,6 +392,9 @@ void shadows_finish(struct gpu *gpu, struct shadows *shadows)
     buffer_finish(&gpu->memory, &shadows->sample_buffer);
     buffer_finish(&gpu->memory, &shadows->view_buffer);
     texture_finish(&gpu->memory, &shadows->maps);
+    glDeleteTextures(1, &shadows->light_texture);
+    glDeleteTextures(1, &shadows->sample_texture);
+    glDeleteTextures(1, &shadows->view_texture);
     if (shadows->framebuffer)
         glDeleteFramebuffers(1, &shadows->framebuffer);
     free(shadows->lights);

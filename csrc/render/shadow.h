@@ -17,6 +17,7 @@ struct shadows {
     int side;                          /* texels of a lamp's map; the world's have half */
     uint32_t layer_count;
     struct buffer light_buffer, sample_buffer, view_buffer;
+    GLuint light_texture, sample_texture, view_texture; /* of these */
     struct texture maps;
     uint64_t *drawn; /* what each quarter of a layer holds, the first for a whole layer's map: a
                         signature of the map, 0: nothing of use */

@@ -327,14 +327,14 @@ brume_result view_shade(struct gpu *gpu, const brume_view *view, int first, int 
 
 /* The rays of blocks, the pixels between them, and those that no block stands for. */
 static brume_result march_half(struct gpu *gpu, const struct view_targets *targets,
-                               const brume_view *view, int first, int end)
+                               const brume_view *view, bool dom, int first, int end)
 {
     static const GLuint none[4] = {0, 1, 1, 0}; /* groups, and pixels */
     const int rows = HALF_ROWS(end, view->height) - HALF_ROWS(first, view->height);
     const struct program *blocks, *upsample, *rest;
-    TRY(program_compute(&gpu->programs, "march_half", &blocks));
+    TRY(program_compute(&gpu->programs, dom ? "march_half:DOM" : "march_half", &blocks));
     TRY(program_compute(&gpu->programs, "march_upsample", &upsample));
-    TRY(program_compute(&gpu->programs, "march_rest", &rest));
+    TRY(program_compute(&gpu->programs, dom ? "march_rest:DOM" : "march_rest", &rest));
     if (rows > 0)
         program_dispatch(blocks, (view->width + 1) / 2, rows, 1);
     glNamedBufferSubData(targets->rest.id, 0, sizeof none, none);
@@ -347,12 +347,12 @@ static brume_result march_half(struct gpu *gpu, const struct view_targets *targe
 }
 
 brume_result view_march(struct gpu *gpu, const struct view_targets *targets, const brume_view *view,
-                        int first, int end)
+                        bool dom, int first, int end)
 {
     if (view->half_march)
-        return march_half(gpu, targets, view, first, end);
+        return march_half(gpu, targets, view, dom, first, end);
     const struct program *program;
-    TRY(program_compute(&gpu->programs, "march", &program));
+    TRY(program_compute(&gpu->programs, dom ? "march:DOM" : "march", &program));
     program_dispatch(program, view->width, end - first, 1);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     return BRUME_OK;

@@ -150,7 +150,7 @@ static brume_result make_ordinates(struct dom_work *work)
     if (work->has_within && has_world(work))
         TRY(lattice_texture(work, &work->world_means, GL_RGBA16F, 1, columns, work->across,
                             "the world's radiance"));
-    const int side = dom_longest_side(&dims);
+    const int side = dom_longest_side(&dims) + 2;
     for (int i = 0; i < 2; ++i)
         TRY(texture_init(&gpu->memory, &work->slices[i], FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
                          texture_side(side), texture_side(side), texture_side(work->count), 1,
@@ -224,7 +224,8 @@ static void bind_lattice(const struct dom_work *work)
 static brume_result over_field(struct dom_work *work, const char *stem, ivec4 offset)
 {
     TRY(lpv_over_lattice(&work->cells, stem, offset, &work->cells.field->dims));
-    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
+                    GL_TEXTURE_UPDATE_BARRIER_BIT);
     return BRUME_OK;
 }
 
@@ -266,37 +267,62 @@ static brume_result prepare(struct dom_work *work)
 
 /* --- Iterations ----------------------------------------------------------------------------- */
 
-/* Light along all ordinates through the whole lattice, slice by slice, into work->means. From
- * beyond its sides comes the world's own light, or of the same kind what the lattice around has
- * there. */
+/* What comes from beyond the lattice's sides, around a slice: the world's own light, or of the same
+ * kind what the lattice around has there. */
+static brume_result come_in(struct dom_work *work, int slice, bool world)
+{
+    const struct program *program;
+    const struct dom_work *around = work->around;
+    const ivec4 dims = work->cells.field->dims;
+    const int sides[5] = {dims.x, dims.y, dims.z, dims.x, dims.y};
+    TRY(program_compute(&work->cells.input->gpu->programs, "dom_border", &program));
+    if (work->surroundings.id)
+        glBindTextureUnit(SLOT_SURROUNDINGS, work->surroundings.id);
+    if (around)
+        glBindTextureUnit(SLOT_MEANS_AROUND, world ? around->world_means.id : around->means.id);
+    glProgramUniform2i(program->id, 1, around ? around->number : -1, around ? around->across : 1);
+    image(SLOT_OUTPUT, &work->slices[slice % 2]);
+    for (int axis = 0, begin = 0; axis < 3; begin += work->axes[axis++]) {
+        const int wide = sides[axis + 1] + 2, high = sides[axis + 2] + 2;
+        if (slice >= sides[axis])
+            continue;
+        glProgramUniform4i(program->id, 0, slice, begin, axis,
+                           world ? 1 + (work->surroundings.id != 0) : 0);
+        program_dispatch(program, slice ? 2 * (wide + high) - 4 : wide * high, 1, work->axes[axis]);
+    }
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    return BRUME_OK;
+}
+
+/* Light along all ordinates through the whole lattice, slice by slice, into work->means: the
+ * world's own alone, or that of sources and surfaces. */
 static brume_result sweep(struct dom_work *work, bool world)
 {
     const struct program *program;
     const int dims[3] = {work->cells.field->dims.x, work->cells.field->dims.y,
                          work->cells.field->dims.z};
+    const bool open = world || work->around;
     TRY(program_compute(&work->cells.input->gpu->programs, "dom_sweep", &program));
+    for (int i = 0; i < 2 && !open; ++i)
+        clear(&work->slices[i]);
     bind_lattice(work);
     glBindTextureUnit(SLOT_CELL_WALLS, work->wall.id);
     glBindTextureUnit(SLOT_ANGULAR, work->sources.id);
-    if (work->surroundings.id)
-        glBindTextureUnit(SLOT_SURROUNDINGS, work->surroundings.id);
-    const struct dom_work *around = work->around;
-    if (around)
-        glBindTextureUnit(SLOT_MEANS_AROUND, world ? around->world_means.id : around->means.id);
-    glProgramUniform2i(program->id, 1, around ? around->number : -1, around ? around->across : 1);
-    image(SLOT_OUTPUT, &work->means);
     image(SLOT_OUTPUT + 2, &work->hits);
     const int most = dom_longest_side(&work->cells.field->dims);
     for (int slice = 0; slice < most; ++slice) {
         TRY(opv_go_on(&work->cells.passes, 0.0f));
+        if (open)
+            TRY(come_in(work, slice, world));
+        image(SLOT_OUTPUT, &work->means);
         glBindTextureUnit(SLOT_SLICE, work->slices[slice % 2].id);
         image(SLOT_OUTPUT + 1, &work->slices[1 - slice % 2]);
         for (int axis = 0, begin = 0; axis < 3; begin += work->axes[axis++]) {
             if (slice >= dims[axis])
                 continue;
-            glProgramUniform4i(program->id, 0, slice, begin, axis,
-                               world ? 1 + (work->surroundings.id != 0) : 0);
-            program_dispatch(program, dims[(axis + 1) % 3], dims[(axis + 2) % 3], work->axes[axis]);
+            glProgramUniform4i(program->id, 0, slice, begin, axis, world);
+            program_dispatch(program, dims[(axis + 1) % 3] * dims[(axis + 2) % 3], 1,
+                             work->axes[axis]);
         }
         glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
         if (work->cells.input->gpu->context.info.software)
@@ -507,20 +533,33 @@ static brume_result solve(struct dom_work *work)
     return BRUME_OK;
 }
 
-/* Light of the last run, where it had some, to begin with. */
+/* Light of another lattice to begin with, where that one is. */
+static brume_result begin_with(struct dom_work *work, const struct buffer *level,
+                               const struct texture *light, const struct texture *wall,
+                               ivec4 offset)
+{
+    bind_lattice(work);
+    glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL_BEFORE, level->id);
+    glBindTextureUnit(SLOT_ANGULAR, light->id);
+    glBindTextureUnit(SLOT_CELL_WALLS, wall->id);
+    glBindTextureUnit(SLOT_MOMENTS, work->world.id);
+    image(SLOT_OUTPUT, &work->now);
+    image(SLOT_OUTPUT + 1, &work->wall);
+    work->warm = true;
+    return over_field(work, "dom_warm", offset);
+}
+
+/* What iterations begin with: what the lattice around has found, and light of the last run. Not of
+ * finer lattices than this: what they tell at its cells' centres is not the cells' mean. */
 static brume_result warm_up(struct dom_work *work, const struct transport *transport)
 {
-    for (int i = 0; i < transport->level_count; ++i) {
-        bind_lattice(work);
-        glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL_BEFORE, transport->levels[i].id);
-        glBindTextureUnit(SLOT_ANGULAR, transport->light.id);
-        glBindTextureUnit(SLOT_CELL_WALLS, transport->wall.id);
-        glBindTextureUnit(SLOT_MOMENTS, work->world.id);
-        image(SLOT_OUTPUT, &work->now);
-        image(SLOT_OUTPUT + 1, &work->wall);
-        TRY(over_field(work, "dom_warm", (ivec4){has_world(work), 0, 0, 0}));
-    }
-    work->warm = transport->level_count > 0;
+    const struct dom_work *around = work->around;
+    if (around)
+        TRY(begin_with(work, &around->cells.level, &around->now, &around->wall, (ivec4){0}));
+    const int levels = work->cells.input->settings->warm ? transport->level_count : 0;
+    for (int i = 0; i < levels && i <= work->number; ++i)
+        TRY(begin_with(work, &transport->levels[i], &transport->light, &transport->wall,
+                       (ivec4){has_world(work), 1, 0, 0}));
     return BRUME_OK;
 }
 
@@ -571,8 +610,7 @@ static brume_result find(struct dom_work *works, int levels, struct transport *t
     for (int i = 0; i < levels; ++i) {
         TRY(prepare(&works[i]));
         TRY(begin(&works[i]));
-        if (works->cells.input->settings->warm)
-            TRY(warm_up(&works[i], transport));
+        TRY(warm_up(&works[i], transport));
         TRY(solve(&works[i]));
     }
     transport->eye = 0;

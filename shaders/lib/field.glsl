@@ -150,12 +150,10 @@ vec3 field_leaves(vec3 p, out float left)
 
 // Of the light at a point, the share that a lattice within another tells: it gives way to that one in
 // its outermost cells, so that no seam shows.
-const float GIVES_WAY = 4.0; // cells
-
 float share_of(gpu_field field, vec3 p)
 {
     vec3 inside = min(p - field.keep_lower.xyz, field.keep_upper.xyz - p);
-    return clamp(min(inside.x, min(inside.y, inside.z)) / (GIVES_WAY * field.lower.w), 0.0, 1.0);
+    return clamp(min(inside.x, min(inside.y, inside.z)) / (float(FIELD_GIVES_WAY) * field.lower.w), 0.0, 1.0);
 }
 
 // The light at a point of no surface (normal: 0), or as it is before one, of lattices up to that number.

@@ -53,7 +53,7 @@ vec3 lamps_seen(view_ray ray, float t_near, float t_far, bool hit)
         t_near = 0.0;
     }
     for (uint i = 0u; i < frame.counts.x; ++i) {
-        gpu_light light = lights[i];
+        gpu_light light = light_at(i);
         if ((light.samples.w & LIGHT_CAMERA_VISIBLE) == 0u)
             continue;
         float t;

@@ -2,15 +2,24 @@
 // What lamps send to a point, without what stands between.
 #include "lib/frame.glsl"
 
-layout(std430, binding = SLOT_LIGHTS) readonly buffer lights_block
-{
-    gpu_light lights[];
-};
+layout(binding = SLOT_LIGHTS) uniform usamplerBuffer lights;
+layout(binding = SLOT_LIGHT_SAMPLES) uniform samplerBuffer light_samples;
 
-layout(std430, binding = SLOT_LIGHT_SAMPLES) readonly buffer light_samples_block
+gpu_light light_at(uint number)
 {
-    gpu_light_sample light_samples[];
-};
+    int first = int(number) * LIGHT_TEXELS;
+    vec4 texels[LIGHT_TEXELS - 2];
+    for (int i = 0; i < LIGHT_TEXELS - 2; ++i)
+        texels[i] = uintBitsToFloat(texelFetch(lights, first + i));
+    return gpu_light(texels[0], texels[1], texels[2], texels[3], texels[4], texels[5],
+                     texelFetch(lights, first + 6), texelFetch(lights, first + 7));
+}
+
+gpu_light_sample light_sample_at(uint number)
+{
+    int first = int(number) * LIGHT_SAMPLE_TEXELS;
+    return gpu_light_sample(texelFetch(light_samples, first), texelFetch(light_samples, first + 1));
+}
 
 // Cycles' cone: the cosine itself, faded over the blend (Blender 3.4).
 float spot_cone(gpu_light light, float cosine)

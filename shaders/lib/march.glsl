@@ -126,16 +126,18 @@ float step_jitter(float jitter, int k)
 vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, float dt, int first,
                 int end, bool in_lattice, ivec2 pixel, float jitter)
 {
-    gpu_light light = lights[number];
+    gpu_light light = light_at(number);
     uint turn = (uint(frame.size.z) + pixel_hash(pixel, number)) % light.samples.y;
-    gpu_light_sample light_sample = light_samples[light.samples.x + turn];
+    gpu_light_sample light_sample = light_sample_at(light.samples.x + turn);
     bool sun = light.info.x == uint(LIGHT_SUN);
     float along;
     float h = nearest_approach(light, light_sample, ray, along);
     // Where a strong forward peak counts as not scattered, the light in the peak itself is seen as far as
     // it is scattered no more, be it forwards: light in the peak that was scattered twice and more is
     // what the lesser depth towards the lamp adds.
+#ifdef DOM
     vec3 sharp = transmittance;
+#endif
     vec3 sum = vec3(0.0);
     for (int k = first; k < end; ++k) {
         float within = step_jitter(jitter, k);
@@ -160,20 +162,21 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
                 light_here *= mean_inverse_square(t0 - along, t0 + dt - along, h);
             vec3 here = m.sigma_s * light_here * light_transmittance(light, p, towards, distance);
             float cosine = dot(towards, ray.direction), phase = phase_hg(cosine, m.g);
-            if (frame.paths.z == 0) {
-                sum += transmittance * step_weight(m.sigma_t, through, dt) * here * phase;
-            } else {
-                // Its lobes below 0 are no light: with what is behind them they could outweigh the peak.
-                float soft = max(phase_truncated(cosine, m.g), 0.0);
-                vec3 sigma_t = m.sigma_t + forward_share(m.g) * m.sigma_s;
-                vec3 sharp_through = exp(-sigma_t * dt);
-                sum += here * (transmittance * step_weight(m.sigma_t, through, dt) * soft +
-                               sharp * step_weight(sigma_t, sharp_through, dt) * (phase - soft));
-            }
+#ifdef DOM
+            // Its lobes below 0 are no light: with what is behind them they could outweigh the peak.
+            float soft = max(phase_truncated(cosine, m.g), 0.0);
+            vec3 sigma_t = m.sigma_t + forward_share(m.g) * m.sigma_s;
+            vec3 sharp_through = exp(-sigma_t * dt);
+            sum += here * (transmittance * step_weight(m.sigma_t, through, dt) * soft +
+                           sharp * step_weight(sigma_t, sharp_through, dt) * (phase - soft));
+#else
+            sum += transmittance * step_weight(m.sigma_t, through, dt) * here * phase;
+#endif
         }
         transmittance *= through;
-        if (frame.paths.z != 0)
-            sharp *= exp(-(m.sigma_t + forward_share(m.g) * m.sigma_s) * dt);
+#ifdef DOM
+        sharp *= exp(-(m.sigma_t + forward_share(m.g) * m.sigma_s) * dt);
+#endif
     }
     return sum * light.factors.z;
 }
@@ -216,8 +219,11 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
         if (field_exists() && frame.paths.y != 0) {
             if (t >= field_next) {
                 vec3 p = ray.origin + ray.direction * t;
-                field = frame.paths.z != 0 ? field_scattered(p)
-                                           : field_scatter(p, -ray.direction, m.g);
+#ifdef DOM
+                field = field_scattered(p);
+#else
+                field = field_scatter(p, -ray.direction, m.g);
+#endif
                 field_next = t + field_every;
             }
             state.indirect += weight * m.sigma_s * field;

@@ -11,10 +11,16 @@ layout(std140, binding = SLOT_ORDINATES) uniform ordinates_block
     gpu_ordinates ordinates;
 };
 
+// By floats: software divides integers one by one, and takes longer for it than for all else here.
+ivec2 divided(int number, int by)
+{
+    int times = int((float(number) + 0.5) / float(by));
+    return ivec2(times, number - times * by);
+}
+
 ivec3 ordinate_texel(ivec3 cell, int number)
 {
-    return cell + ivec3(0, number / ordinates.count.y, number % ordinates.count.y) *
-                      ivec3(0, level.dims.yz);
+    return cell + ivec3(0, divided(number, ordinates.count.y) * level.dims.yz);
 }
 
 // The mean cosine of a cell that nothing scatters in.
@@ -46,6 +52,19 @@ ivec3 mixed_texel(ivec3 cell, int number)
 ivec3 placed(int axis, int along, ivec2 at)
 {
     return axis == 0 ? ivec3(along, at) : (axis == 1 ? ivec3(at.y, along, at.x) : ivec3(at, along));
+}
+
+// Where light on its way from one slice to the next stands: a layer for each ordinate, with what comes from
+// beyond the lattice's sides around it.
+ivec3 slice_texel(ivec2 at, int number)
+{
+    return ivec3(at + 1, number);
+}
+
+// The sides of a slice across an axis.
+ivec3 slice_dims(int axis)
+{
+    return axis == 0 ? level.dims.xyz : (axis == 1 ? level.dims.yzx : level.dims.zxy);
 }
 
 // A direction's own axes: the major one first.

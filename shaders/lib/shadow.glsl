@@ -4,10 +4,15 @@
 
 layout(binding = SLOT_SHADOW) uniform sampler2DArray shadow_maps;
 
-layout(std430, binding = SLOT_SHADOW_VIEWS) readonly buffer shadow_views_block
+layout(binding = SLOT_SHADOW_VIEWS) uniform samplerBuffer shadow_views;
+
+gpu_shadow_view shadow_view(int number)
 {
-    gpu_shadow_view shadow_views[];
-};
+    vec4 texels[SHADOW_VIEW_TEXELS];
+    for (int i = 0; i < SHADOW_VIEW_TEXELS; ++i)
+        texels[i] = texelFetch(shadow_views, number * SHADOW_VIEW_TEXELS + i);
+    return gpu_shadow_view(mat4(texels[0], texels[1], texels[2], texels[3]), texels[4], texels[5]);
+}
 
 // Distance of the occluder that a texel of the map holds.
 float shadow_distance(gpu_shadow_view view, float depth)
@@ -55,7 +60,7 @@ float shadow_test(gpu_shadow_view view, vec3 p, float bias, bool soft)
 // that a texel of the map rounds.
 float shadow_medium(int number, vec3 p, float distance)
 {
-    gpu_shadow_view view = shadow_views[number];
+    gpu_shadow_view view = shadow_view(number);
     return shadow_test(view, p, 1.5 * view.range.w * distance, false);
 }
 
@@ -84,7 +89,7 @@ int shadow_face(gpu_light light, vec3 v)
 // the bias is bounded: at grazing light the offset along the normal does the rest.
 float shadow_surface(int number, vec3 p, float distance, vec3 normal, vec3 towards)
 {
-    gpu_shadow_view view = shadow_views[number];
+    gpu_shadow_view view = shadow_view(number);
     float texel = view.range.w * distance;
     float cosine = clamp(dot(normal, towards), 0.05, 1.0);
     float slope = min(sqrt(1.0 - cosine * cosine) / cosine, 4.0);

@@ -34,17 +34,14 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_LEVEL_BEFORE 4  /* DOM: a lattice of the last run */
 
 /* Storage buffers */
-#define SLOT_LIGHTS 0
-#define SLOT_LIGHT_SAMPLES 1
-#define SLOT_SHADOW_VIEWS 2
-#define SLOT_MATERIALS 3
-#define SLOT_INSTANCES 4
-#define SLOT_ACCUMULATION 5
-#define SLOT_DEPTH_SOURCES 6
-#define SLOT_REST 6
-#define SLOT_DEPTH_GROUPS 7
-#define SLOT_POWERS 8
-#define SLOT_DOTS 9
+#define SLOT_MATERIALS 0
+#define SLOT_INSTANCES 1
+#define SLOT_ACCUMULATION 2
+#define SLOT_DEPTH_SOURCES 4
+#define SLOT_REST 4
+#define SLOT_DEPTH_GROUPS 5
+#define SLOT_POWERS 6
+#define SLOT_DOTS 7
 
 /* Textures */
 #define SLOT_MEDIUM_SCATTER 0
@@ -80,6 +77,11 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_HALF 31
 #define SLOT_AROUND 32       /* which cell of the lattice around a cell beyond this one is in */
 #define SLOT_SCATTERED 33    /* what cells scatter towards the eye */
+/* Lists that are read as texels: of a storage buffer software reads every number for every lane by itself,
+ * which took a third of the time of shading and a quarter of that of the march. */
+#define SLOT_LIGHTS 36
+#define SLOT_LIGHT_SAMPLES 37
+#define SLOT_SHADOW_VIEWS 38
 /* DOM's, while it looks for the field */
 #define SLOT_ANGULAR 24      /* by ordinates: the source; in the end what cells' means are, */
 #define SLOT_HITS 25         /* and what meets surfaces */
@@ -137,8 +139,10 @@ typedef struct mat4 { float m[16]; } mat4;
 /* Samples of a lamp with extent whose transmittances are averaged, two by two in a texture. */
 #define EXTENDED_SAMPLES 4
 
-/* Lattices of light scattered or reflected, one within another, at most. */
+/* Lattices of light scattered or reflected, one within another, at most; outermost cells of one over
+ * which it gives way to the one around it. */
 #define FIELD_LEVELS 3
+#define FIELD_GIVES_WAY 4
 
 /* DOM: ordinates, the directions that light is carried along, at most; moments of the radiance, real
  * spherical harmonics of bands 0 to 3, four by four in a texture; of these the first bands, 0 and 1, are
@@ -171,6 +175,7 @@ struct gpu_light {
     uvec4 samples;   /* first sample, count, faces a sample, LIGHT_ flags */
     uvec4 info;      /* type; tile origin of its optical depth (y, z); 1 if it has one */
 };
+#define LIGHT_TEXELS 8
 
 struct gpu_light_sample {
     vec4 position;   /* point on the light; sun and world: unit vector towards it.
@@ -178,6 +183,7 @@ struct gpu_light_sample {
     vec4 weight;     /* world: radiance times solid angle. area: middle and half size of the
                         stratum in [-1, 1]^2 */
 };
+#define LIGHT_SAMPLE_TEXELS 2
 
 /* One shadow map: a layer of their texture, or a quarter of one. */
 struct gpu_shadow_view {
@@ -186,6 +192,7 @@ struct gpu_shadow_view {
                         distance 1 (perspective) or anywhere (orthographic) */
     vec4 tile;       /* x, y: lower corner in the layer, 0..1; z: side, 0..1; w: layer */
 };
+#define SHADOW_VIEW_TEXELS 6
 
 #define MATERIAL_BASE_IMAGE 1u
 #define MATERIAL_ROUGHNESS_IMAGE 2u
@@ -319,9 +326,7 @@ struct gpu_frame {
                             samples, in an order of steps of w among them */
     vec4 march;          /* step, m; steps in fog alone; rows of this dispatch: first, end */
     ivec4 paths;         /* 0 leaves out: x: what media scatter of the lights' own light; y: of the
-                            field; z: 1: strong forward scattering counts as none in all optical
-                            depths (delta-M), and media take the field from the lattice of what
-                            cells scatter towards the eye */
+                            field */
     ivec4 pass_slots[2]; /* slot of each pass in the accumulation buffer, -1: not wanted */
 };
 

@@ -484,7 +484,8 @@ typedef struct brume_settings {
     int32_t field_resolution;        /* cells along the longest side of the lattice in which scattered
                                         and reflected light goes on; 0: half of lattice_resolution */
     int32_t cascades;                /* such lattices, each within the last, of half its length and as
-                                        many cells; at most 3; 0: 1 */
+                                        many cells; at most 3; 0: 1, and with DOM another around
+                                        media that are small in it, where memory allows */
     uint32_t cascade_focus;          /* brume_focus */
     int32_t ordinates;               /* DOM: directions that light is carried along: 26, 48 or 96; 0: 48 */
     uint32_t warm;                   /* DOM: 1: iterations begin with the light that the scene had last:

@@ -16,7 +16,7 @@ static const struct coefficients white_fog = {.sigma_s = {1.0f, 0.5f, 0.25f}};
 struct field {
     brume_scene *scene;
     struct gpu_field levels[FIELD_LEVELS];
-    int level; /* that the functions below are of */
+    int level_count, level; /* the latter: that the functions below are of */
     int width, height, depth;
     float *texels;
 };
@@ -28,6 +28,7 @@ static bool fetch(struct gpu *gpu, void *user)
     const struct renderer *renderer = &field->scene->renderer;
     const struct texture *texture = &renderer->transport.field;
     memcpy(field->levels, renderer->frame.fields, sizeof field->levels);
+    field->level_count = renderer->frame.field.x;
     field->width = texture->width;
     field->height = texture->height;
     field->depth = texture->depth;

@@ -104,10 +104,11 @@ class BrumeSettings(bpy.types.PropertyGroup):
                ('96', "96", "For thin fog in rooms with small bright spots, and to see whether "
                             "fewer would do", 96)])
     cascades: IntProperty(
-        name="Cascades", update=changed, default=1, min=1, max=3,
+        name="Cascades", update=changed, default=0, min=0, max=3,
         description="Lattices of scattered and reflected light, each within the last and half as "
                     "long, with as many cells: finer where it counts, without a finer whole. Two "
-                    "take three times as long as one, three seven times")
+                    "take three times as long as one, three seven times. 0: one, and with DOM "
+                    "another around volumes that are small in it, twice to four times as fine")
     cascade_focus: EnumProperty(
         name="Finer Around", update=changed, default='MEDIUM',
         description="What the cascades after the first surround",

@@ -24,7 +24,6 @@ static brume_result check_settings(brume_settings *settings)
     set_default(&settings->medium_resolution, 128);
     set_default(&settings->lattice_resolution, 64);
     set_default(&settings->field_resolution, (settings->lattice_resolution + 1) / 2);
-    set_default(&settings->cascades, 1);
     set_default(&settings->ordinates, 48);
     set_default(&settings->shadow_resolution, 512);
     set_default(&settings->light_samples, 8);
@@ -39,7 +38,7 @@ static brume_result check_settings(brume_settings *settings)
     REQUIRE(settings->medium_resolution >= 1 && settings->medium_resolution <= 1024);
     REQUIRE(settings->lattice_resolution >= 1 && settings->lattice_resolution <= 512);
     REQUIRE(settings->field_resolution >= 1 && settings->field_resolution <= 256);
-    REQUIRE(settings->cascades >= 1 && settings->cascades <= FIELD_LEVELS);
+    REQUIRE(settings->cascades >= 0 && settings->cascades <= FIELD_LEVELS);
     REQUIRE(settings->ordinates == 26 || settings->ordinates == 48 || settings->ordinates == 96);
     REQUIRE(settings->warm <= 1);
     REQUIRE(settings->converged >= 1e-5f && settings->converged <= 1.0f);

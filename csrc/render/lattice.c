@@ -13,6 +13,7 @@
 
 #define SKY_NODE_BYTES 24 /* three times four halves */
 #define FAR 1e30f
+#define MOST_PARTS 4 /* of a cell's side in a lattice within */
 
 struct box {
     float lower[3], upper[3];
@@ -188,7 +189,7 @@ uint64_t lattice_field_bytes(const struct renderer *renderer, const brume_settin
     uint64_t cells = 0, slices = 0;
     for (int i = 0; i < frame->field.x; ++i) {
         const ivec4 dims = frame->fields[i].dims;
-        const uint64_t side = (uint64_t)dom_longest_side(&dims);
+        const uint64_t side = (uint64_t)dom_longest_side(&dims) + 2;
         if (settings->method == BRUME_METHOD_DOM)
             slices += side * side * (uint64_t)settings->ordinates * DOM_SLICE_BYTES;
         cells += (uint64_t)dims.x * (uint64_t)dims.y * (uint64_t)dims.z;
@@ -309,29 +310,89 @@ static void focus_of(const struct renderer *renderer, const struct render_reques
         focus[i] = world[12 + i] - view[4 * i + 2] * (0.4f * length);
 }
 
-/* Half as long as the one around it, of whole cells of that one. It follows the focus in steps, so that
- * small moves change nothing. Where both end nothing gives way. */
-static struct gpu_field field_within(const struct gpu_field *around, const float focus[3])
+/* Of whole cells of the one around it: on each axis as many as `cells` says from `first` on, each parted
+ * into `parts`. Where both end nothing gives way. */
+static struct gpu_field field_within(const struct gpu_field *around, const int first[3],
+                                     const int cells[3], int parts)
 {
-    struct gpu_field field = {.lower = {.w = 0.5f * around->lower.w}};
+    struct gpu_field field = {.lower = {.w = around->lower.w / (float)parts}};
     for (int i = 0; i < 3; ++i) {
-        const int all = (&around->dims.x)[i], cells = (all + 1) / 2;
-        const int step = cells / 8 ? cells / 8 : 1;
-        const float begin = (&around->lower.x)[i], cell = around->lower.w;
-        const float wanted = ((focus[i] - begin) / cell - 0.5f * (float)cells) / (float)step;
-        int first = (int)floorf(fmaxf(fminf(wanted, 1e6f), 0.0f) + 0.5f) * step;
-        first = first < all - cells ? first : all - cells;
-        const float lower = begin + (float)first * cell;
-        const float upper = lower + (float)cells * cell;
-        (&field.dims.x)[i] = 2 * cells;
+        const float lower = (&around->lower.x)[i] + (float)first[i] * around->lower.w;
+        const float upper = lower + (float)cells[i] * around->lower.w;
+        const bool ends = first[i] + cells[i] == (&around->dims.x)[i];
+        (&field.dims.x)[i] = parts * cells[i];
         (&field.lower.x)[i] = lower;
         (&field.keep_lower.x)[i] =
-            first == 0 ? (&around->keep_lower.x)[i] : lower + 0.5f * field.lower.w;
+            first[i] == 0 ? (&around->keep_lower.x)[i] : lower + 0.5f * field.lower.w;
         (&field.keep_upper.x)[i] =
-            first == all - cells ? (&around->keep_upper.x)[i] : upper - 0.5f * field.lower.w;
+            ends ? (&around->keep_upper.x)[i] : upper - 0.5f * field.lower.w;
     }
     field.dims.w = around->dims.w + around->dims.z;
     return field;
+}
+
+/* Half as long as the one around it. It follows the focus in steps, so that small moves change
+ * nothing. */
+static struct gpu_field field_half(const struct gpu_field *around, const float focus[3])
+{
+    int first[3], cells[3];
+    for (int i = 0; i < 3; ++i) {
+        const int all = (&around->dims.x)[i];
+        cells[i] = (all + 1) / 2;
+        const int step = cells[i] / 8 ? cells[i] / 8 : 1;
+        const float off = (focus[i] - (&around->lower.x)[i]) / around->lower.w;
+        const float wanted = (off - 0.5f * (float)cells[i]) / (float)step;
+        first[i] = (int)floorf(fmaxf(fminf(wanted, 1e6f), 0.0f) + 0.5f) * step;
+        first[i] = first[i] < all - cells[i] ? first[i] : all - cells[i];
+    }
+    return field_within(around, first, cells, 2);
+}
+
+/* Around the media, where they are so small in the lattice that cells half as long or shorter make no
+ * more of them than it has itself; a little longer than they are, for what gives way. */
+static bool field_of_medium(const struct medium_textures *medium, const struct gpu_field *around,
+                            int resolution, struct gpu_field *out)
+{
+    const struct box fog = {{medium->lower[0], medium->lower[1], medium->lower[2]},
+                            {medium->upper[0], medium->upper[1], medium->upper[2]}};
+    const float cell = around->lower.w, fit = (float)resolution * cell / longest(&fog);
+    const int parts = fit < MOST_PARTS ? (int)fit : MOST_PARTS;
+    if (parts < 2)
+        return false;
+    int first[3], cells[3];
+    for (int i = 0; i < 3; ++i) {
+        const float margin = FIELD_GIVES_WAY / (float)parts - 0.01f;
+        const float low = (fog.lower[i] - (&around->lower.x)[i]) / cell - margin;
+        const float high = (fog.upper[i] - (&around->lower.x)[i]) / cell + margin;
+        const float all = (float)(&around->dims.x)[i];
+        first[i] = (int)floorf(fmaxf(low, 0.0f));
+        cells[i] = (int)ceilf(fminf(high, all)) - first[i];
+    }
+    *out = field_within(around, first, cells, parts);
+    return true;
+}
+
+/* The lattices within the first. */
+static void layout_within(struct renderer *renderer, const struct render_request *request,
+                          const struct box *box, int resolution)
+{
+    struct gpu_frame *frame = &renderer->frame;
+    const brume_settings *settings = &request->settings;
+    const int asked = settings->cascades;
+    frame->field.x = 1;
+    if (!asked) {
+        const struct medium_textures *medium = &renderer->medium;
+        if (settings->method == BRUME_METHOD_DOM && medium->dims[0] &&
+            field_of_medium(medium, &frame->fields[0], resolution, &frame->fields[1]))
+            frame->field.x = 2;
+        return;
+    }
+    for (; frame->field.x < asked; ++frame->field.x) {
+        const int i = frame->field.x;
+        float focus[3];
+        focus_of(renderer, request, ldexpf(longest(box), -i), focus);
+        frame->fields[i] = field_half(&frame->fields[i - 1], focus);
+    }
 }
 
 /* Fills frame->fields for as many cells as fit the budget. Returns how many along the longest side. */
@@ -345,16 +406,15 @@ static int layout_field(struct renderer *renderer, const struct render_request *
     if (!lattice_wants_field(settings) || box_is_empty(&box))
         return settings->field_resolution;
     int resolution = settings->field_resolution < 2 ? 2 : settings->field_resolution;
-    frame->field.x = settings->cascades;
     for (;; resolution = resolution * 3 / 4) {
         frame->fields[0] = whole_field(&box, resolution);
         fit_field(&frame->fields[0], &box, renderer);
-        for (int i = 1; i < frame->field.x; ++i) {
-            float focus[3];
-            focus_of(renderer, request, ldexpf(longest(&box), -i), focus);
-            frame->fields[i] = field_within(&frame->fields[i - 1], focus);
-        }
+        layout_within(renderer, request, &box, resolution);
         if (lattice_field_bytes(renderer, settings) <= renderer->shares.field || resolution <= 4)
+            return resolution;
+        /* Rather none that was not asked for than all coarser. */
+        frame->field.x = settings->cascades ? settings->cascades : 1;
+        if (lattice_field_bytes(renderer, settings) <= renderer->shares.field)
             return resolution;
     }
 }

@@ -124,6 +124,74 @@ static void finer_within(void **state)
     }
 }
 
+/* --- Around media, unasked --------------------------------------------------------------------- */
+
+/* A little thick fog by a lamp, in a black room: what light there is goes on in the fog alone. */
+static brume_scene *little_fog(void)
+{
+    const struct coefficients fog = {.sigma_s = {12, 12, 12}};
+    brume_scene *scene = empty();
+    add_box(scene, 1, 1.0f, 0.0f);
+    add_fog_cube(scene, 2, (float[3]){0.1f, -0.1f, 0}, 0.2f, &fog);
+    add_lamp(scene, 3, (float[3]){0.5f, 0.4f, 0.6f}, 1.0f);
+    return scene;
+}
+
+/* With as many cells as the whole has the fog's light is as finer ones find it; and not for other
+ * methods, nor where memory is short: then the whole stays as fine as it is. */
+static void around_little_fog(void **state)
+{
+    (void)state;
+    brume_scene *scene = little_fog();
+    brume_settings settings = settings_for(BRUME_METHOD_DOM, CELLS / 2, 0);
+    struct field within = field_of(scene, &settings, NULL);
+    assert_int_equal(within.level_count, 2);
+    within.level = 1;
+    assert_true(cell_of(&within) < 0.3f * within.levels[0].lower.w);
+    settings = settings_for(BRUME_METHOD_DOM, CELLS / 2, 1);
+    struct field coarse = field_of(scene, &settings, NULL);
+    assert_int_equal(coarse.level_count, 1);
+    settings = settings_for(BRUME_METHOD_DOM, 2 * CELLS, 1);
+    struct field fine = field_of(scene, &settings, NULL);
+    double all = 0.0, coarse_off = 0.0, within_off = 0.0;
+    int cell[3];
+    const int *dims = dims_of(&within);
+    for (cell[2] = 0; cell[2] < dims[2]; ++cell[2])
+        for (cell[1] = 0; cell[1] < dims[1]; ++cell[1])
+            for (cell[0] = 0; cell[0] < dims[0]; ++cell[0]) {
+                static const float middle[3] = {0.1f, -0.1f, 0};
+                float p[3], aside = 0.0f;
+                for (int i = 0; i < 3; ++i) {
+                    p[i] = centre(&within, i, cell[i]);
+                    aside = fmaxf(aside, fabsf(p[i] - middle[i]));
+                }
+                if (aside > 0.2f)
+                    continue;
+                const double f = fluence_at(&fine, p, 0);
+                all += f;
+                coarse_off += fabs(fluence_at(&coarse, p, 0) - f);
+                within_off += fabs(fluence(&within, cell, 0) - f);
+            }
+    print_message("fluence in a little fog, off finer cells: within %.2f %%, around %.2f %%\n",
+                  100.0 * within_off / all, 100.0 * coarse_off / all);
+    assert_true(within_off < 0.3 * coarse_off);
+    free(within.texels);
+    free(coarse.texels);
+    free(fine.texels);
+
+    settings = settings_for(BRUME_METHOD_LPV, CELLS, 0);
+    struct field soft = field_of(scene, &settings, NULL);
+    assert_int_equal(soft.level_count, 1);
+    free(soft.texels);
+    settings = settings_for(BRUME_METHOD_DOM, CELLS, 0);
+    settings.memory_budget = 40u << 20;
+    struct field small = field_of(scene, &settings, NULL);
+    assert_int_equal(small.level_count, 1);
+    assert_int_equal(dims_of(&small)[0], CELLS);
+    free(small.texels);
+    brume_scene_destroy(scene);
+}
+
 /* --- The focus -------------------------------------------------------------------------------- */
 
 static uint64_t transports(brume_scene *scene, const brume_settings *settings,
@@ -201,6 +269,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(as_bright_as_around),
         cmocka_unit_test(finer_within),
+        cmocka_unit_test(around_little_fog),
         cmocka_unit_test(around_the_camera),
         cmocka_unit_test(odd_lattices),
     };

@@ -11,6 +11,7 @@ static brume_settings settings_for(int cells, uint32_t warm)
                             .medium_resolution = 32,
                             .lattice_resolution = 32,
                             .field_resolution = cells,
+                            .cascades = 1,
                             .ordinates = 26,
                             .warm = warm,
                             .shadow_resolution = 64,

@@ -62,11 +62,6 @@ void main()
         return;
     vec4 mean = texelFetch(scattered_lattice, above(cell), 0);
     uint cuts = cuts_of(level, cell);
-    // Loops rather than branches: software runs through both sides of every branch.
-    vec3 light = vec3(0.0);
-    for (int scatters = mean.w == 0.0 ? 1 : 0; scatters > 0; --scatters)
-        light = sharpened(cell, cuts, mean.rgb);
-    for (int empty = mean.w == 0.0 ? 0 : 1; empty > 0; --empty)
-        light = gone_on(cell, cuts);
+    vec3 light = mean.w == 0.0 ? sharpened(cell, cuts, mean.rgb) : gone_on(cell, cuts);
     imageStore(between_image, above(cell), fit(light, cuts == 0u ? 0.0 : 1.0));
 }

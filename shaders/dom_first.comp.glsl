@@ -40,9 +40,10 @@ void add_point(inout vec3 q[MOMENTS], vec3 p, float part, uint lot)
         return;
     sigma_s *= 1.0 - forward_share(g);
     vec4 bands = scaled_bands(g);
-    for (uint i = 0u; i < frame.counts.x; ++i) {
-        gpu_light light = light_at(i);
-        gpu_light_sample s = light_sample_at(light.samples.x + lot % light.samples.y);
+    uint number = 0u;
+    if (frame.counts.x > 0u) do {
+        gpu_light light = light_at(number);
+        gpu_light_sample s = light_sample_at(light.samples.x + turn_of(lot, light.samples.y));
         vec3 towards;
         float distance;
         vec3 intensity = light_in_cube(light, s, p, part, towards, distance);
@@ -54,7 +55,7 @@ void add_point(inout vec3 q[MOMENTS], vec3 p, float part, uint lot)
         harmonics(-towards, y);
         for (int m = 0; m < MOMENTS; ++m)
             q[m] += scattered * (bands[band_of(m)] * y[m]);
-    }
+    } while (++number < frame.counts.x);
 }
 
 void main()
@@ -71,10 +72,11 @@ void main()
         uint start = hash(uint(cell.x) + hash(uint(cell.y) + hash(uint(cell.z))));
         int points = points_in_cell(POINTS, 4);
         float part = side / float(points);
-        for (int i = 0; i < points * points * points; ++i) {
+        int i = 0;
+        do {
             vec3 p = point_in_cell(cell, i, points);
             add_point(q, p, part, start + uint(i));
-        }
+        } while (++i < points * points * points);
         // A source in a cell that dims next to nothing would be next to infinite.
         vec3 per = 1.0 / (float(points * points * points) * max(extinct, vec3(1e-4 / side)));
         for (int m = 0; m < MOMENTS; ++m)

@@ -21,7 +21,7 @@ vec3 reflected(vec3 p, vec3 normal, vec3 reflectance, int lot)
     vec3 sum = vec3(0.0);
     for (uint i = 0u; i < frame.counts.x; ++i) {
         gpu_light light = light_at(i);
-        gpu_light_sample s = light_sample_at(light.samples.x + uint(lot) % light.samples.y);
+        gpu_light_sample s = light_sample_at(light.samples.x + turn_of(uint(lot), light.samples.y));
         vec3 towards;
         float square;
         vec3 intensity = light_intensity(light, s.position.xyz, p, towards, square) * light.factors.x;

@@ -25,10 +25,10 @@ layout(binding = SLOT_OUTPUT + 1, rgba16f) writeonly uniform image3D slice_image
 layout(binding = SLOT_OUTPUT + 2, rgba16f) writeonly uniform image3D hits_image;
 
 // How much the source grows along the way through a cell, from the cells around.
-vec3 growth(bool wanted, ivec3 cell, int number, vec3 way, vec4 own, uint cuts)
+vec3 growth(ivec3 cell, int number, vec3 way, vec4 own, uint cuts)
 {
     vec3 sum = vec3(0.0);
-    for (int axis = wanted ? 0 : 3; axis < 3; ++axis) {
+    for (int axis = 0; axis < 3; ++axis) {
         ivec3 offset = ivec3(axis == 0, axis == 1, axis == 2);
         ivec3 before = max(cell - offset, ivec3(0)), after = min(cell + offset, level.dims.xyz - 1);
         vec4 low = texelFetch(sources, ordinate_texel(before, number), 0);
@@ -75,7 +75,9 @@ void main()
         pass.w != 0 ? vec4(0.0) : texelFetch(sources, ordinate_texel(cell, number), 0);
     vec3 gives = mix(1.0 - through, depth * (1.0 - 0.5 * depth), lessThan(depth, vec3(1e-3)));
     bool thick = max(depth.r, max(depth.g, depth.b)) > 0.02 && source.w > 0.0;
-    vec3 grows = growth(thick, cell, number, direction * long_, source, cuts);
+    vec3 grows = vec3(0.0);
+    if (thick)
+        grows = growth(cell, number, direction * long_, source, cuts);
     vec3 leaves = enters * through + source.rgb * gives +
                   grows * (0.5 * (1.0 + through) - gives / max(depth, vec3(1e-3)));
     // Of thin cells to the second order.

@@ -26,7 +26,7 @@ void main()
 {
     front = back = vec4(0.0);
     gl_Position = vec4(0.0, 0.0, 2.0, 1.0); // nowhere
-    ivec2 texel = ivec2(gl_VertexID % stage.what.w, gl_VertexID / stage.what.w);
+    ivec2 texel = divided(gl_VertexID, stage.what.w).yx;
     vec4 position = texelFetch(rsm[0], texel, 0);
     if (position.w == 0.0)
         return;

@@ -40,9 +40,10 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
         add_fog(sigma_s, g);
     if (sigma_s == vec3(0.0))
         return;
-    for (uint i = 0u; i < frame.counts.x; ++i) {
-        gpu_light light = light_at(i);
-        gpu_light_sample s = light_sample_at(light.samples.x + lot % light.samples.y);
+    uint number = 0u;
+    if (frame.counts.x > 0u) do {
+        gpu_light light = light_at(number);
+        gpu_light_sample s = light_sample_at(light.samples.x + turn_of(lot, light.samples.y));
         vec3 towards;
         float distance;
         vec3 intensity = light_in_cube(light, s, p, part, towards, distance);
@@ -51,7 +52,7 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
         vec3 power = intensity * light_transmittance(light, p, towards, distance) * sigma_s * volume;
         for (int c = 0; c < 3; ++c)
             flow[c] += power[c] * vec4(1.0, -g * towards);
-    }
+    } while (++number < frame.counts.x);
     if (frame.sky_dims.w != 0) {
         vec3 uvw = sky_coordinate(p);
         vec4 scattered = volume * vec4(1.0, vec3(g));
@@ -73,11 +74,12 @@ void begin(ivec3 cell)
         uint start = hash(uint(cell.x) + hash(uint(cell.y) + hash(uint(cell.z))));
         int points = points_in_cell(POINTS, 4);
         float part = side / float(points);
-        for (int i = 0; i < points * points * points; ++i) {
+        int i = 0;
+        do {
             // No lots: what is turned by a right angle is lit alike.
             vec3 p = point_in_cell(cell, i, points);
             add_scattered(flow, p, part, start + uint(i));
-        }
+        } while (++i < points * points * points);
     }
     vec3 power;
     for (int c = 0; c < 3; ++c) {

@@ -19,7 +19,7 @@ layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image2D surface_image;
 vec3 light_surface(surface s, vec3 p, gpu_light light, ivec2 pixel, uint number)
 {
     // Each pixel walks through all samples of the light, from a start of its own.
-    uint turn = (uint(frame.size.z) + pixel_hash(pixel, number)) % light.samples.y;
+    uint turn = turn_of(uint(frame.size.z) + pixel_hash(pixel, number), light.samples.y);
     gpu_light_sample light_sample = light_sample_at(light.samples.x + turn);
     vec2 lot = vec2(pixel_random(pixel, 2u * number + 101u),
                     pixel_random(pixel, 2u * number + 102u)) * 2.0 - 1.0;
@@ -59,11 +59,12 @@ vec3 world_diffuse(surface s, vec3 p, ivec2 pixel, float within)
     // A pixel's samples take every so-manieth direction, which are spread as evenly as all are, from
     // a start of its own: what few directions do not resolve becomes grain rather than bands.
     uint every = frame.counts.z, stride = frame.counts.w;
-    uint taken = frame.world.y / every;
-    uint start = pixel_hash(pixel, 7u);
-    uint first = uint(frame.size.z) * frame.world.z % taken;
-    for (uint i = 0u; i < frame.world.z; ++i) {
-        uint turn = (start % frame.world.y + every * ((first + i) * stride % taken)) % frame.world.y;
+    uint taken = uint(divided(int(frame.world.y), int(every)).x);
+    uint start = turn_of(pixel_hash(pixel, 7u), frame.world.y);
+    uint first = turn_of(uint(frame.size.z) * frame.world.z, taken);
+    uint i = 0u;
+    do {
+        uint turn = turn_of(start + every * turn_of((first + i) * stride, taken), frame.world.y);
         gpu_light_sample w = light_sample_at(frame.world.x + turn);
         vec3 reflected = bsdf_diffuse(s, w.position.xyz);
         if (reflected == vec3(0.0))
@@ -72,7 +73,7 @@ vec3 world_diffuse(surface s, vec3 p, ivec2 pixel, float within)
         if (lit > 0.0)
             sum += reflected * w.weight.rgb *
                    (lit * world_transmittance(p, w.position.xyz, within));
-    }
+    } while (++i < frame.world.z);
     return sum * (float(frame.world.y) / float(frame.world.z));
 }
 
@@ -152,8 +153,10 @@ void main()
         s.roughness = diffuse.w;
         s.specular = texelFetch(gbuffer_specular, pixel, 0).rgb;
         vec3 p = ray.origin + ray.direction * (normal_depth.w * ray.stretch);
-        for (uint i = 0u; i < frame.counts.x; ++i)
+        uint i = 0u;
+        if (frame.counts.x > 0u) do
             radiance += light_surface(s, p, light_at(i), pixel, i);
+        while (++i < frame.counts.x);
         if (frame.world.y > 0u && frame.fog_upper.w == 0.0) {
             float within = pixel_random(pixel, 8u);
             radiance += world_diffuse(s, p, pixel, within) + world_specular(s, p, pixel, within);

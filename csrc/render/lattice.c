@@ -348,14 +348,15 @@ static struct gpu_field field_half(const struct gpu_field *around, const float f
     return field_within(around, first, cells, 2);
 }
 
-/* Around the media, where they are so small in the lattice that cells half as long or shorter make no
- * more of them than it has itself; a little longer than they are, for what gives way. */
+/* Around the media, where they are so small in the lattice that with cells half as long or shorter
+ * another is about as long as that; a little longer than the media, for what gives way. */
 static bool field_of_medium(const struct medium_textures *medium, const struct gpu_field *around,
                             int resolution, struct gpu_field *out)
 {
     const struct box fog = {{medium->lower[0], medium->lower[1], medium->lower[2]},
                             {medium->upper[0], medium->upper[1], medium->upper[2]}};
-    const float cell = around->lower.w, fit = (float)resolution * cell / longest(&fog);
+    const float cell = around->lower.w;
+    const float fit = (float)(resolution - FIELD_GIVES_WAY) * cell / longest(&fog) + 0.01f;
     const int parts = fit < MOST_PARTS ? (int)fit : MOST_PARTS;
     if (parts < 2)
         return false;

@@ -103,14 +103,15 @@ field_light field_between(gpu_field field, vec3 p, vec4 plane)
     field_light light = field_light(vec3(0.0), mat3(0.0));
     float sum = 0.0;
     int corners = 8 * min(frame.field.x, 1); // not unrolled, which would take seconds to compile
-    for (int corner = 0; corner < corners; ++corner) {
+    int corner = 0;
+    do {
         ivec3 cell;
         float weight = share_of_cell(cells, field, corner, plane, cell);
         if (weight <= 0.0)
             continue;
         sum += weight;
         add_cell(light, field, cell, weight);
-    }
+    } while (++corner < corners);
     if (sum > 1e-3) {
         light.fluence /= sum;
         light.flux /= sum;
@@ -163,7 +164,8 @@ field_light field_at(vec3 p, vec3 normal, int finest)
     bool surface = normal != vec3(0.0);
     vec4 plane = vec4(normal, surface ? dot(normal, p) : -1.0);
     float left = 1.0;
-    for (int number = finest; number >= 0 && left > 0.0; --number) {
+    int number = max(finest, 0);
+    do {
         gpu_field field = frame.fields[number];
         float share = number > 0 ? left * share_of(field, p) : left;
         if (share <= 0.0)
@@ -173,7 +175,7 @@ field_light field_at(vec3 p, vec3 normal, int finest)
         light.fluence += share * here.fluence;
         light.flux += share * here.flux;
         left -= share;
-    }
+    } while (--number >= 0 && left > 0.0);
     return light;
 }
 
@@ -201,13 +203,12 @@ vec3 scattered_in(gpu_field field, vec3 p)
     vec3 last = clamp(at, vec3(0.5), vec3(field.dims.xyz) - 0.5);
     vec4 light = scattered_at(field, last);
     // Beyond the outermost cells' centres it goes on as before them.
-    for (int beyond = at == last ? 0 : 1; beyond > 0; --beyond) {
+    if (at != last) {
         vec3 before = scattered_at(field, clamp(2.0 * last - at, vec3(0.5), vec3(field.dims.xyz) - 0.5)).rgb;
         light.rgb = clamp(2.0 * light.rgb - before, vec3(0.0), 2.0 * light.rgb);
     }
     vec4 sum = vec4(0.0);
-    // A loop rather than a branch: software runs through both sides of every branch.
-    for (int near = light.w > 0.0 ? 1 : 0; near > 0; --near) {
+    if (light.w > 0.0) {
         cells_between cells = cells_around(field, p);
         for (int corner = 0; corner < 8; ++corner) {
             ivec3 cell;
@@ -224,13 +225,14 @@ vec3 field_scattered(vec3 p)
         return vec3(0.0);
     vec3 light = vec3(0.0);
     float left = 1.0;
-    for (int number = frame.field.x - 1; number >= 0 && left > 0.0; --number) {
+    int number = max(frame.field.x - 1, 0);
+    do {
         float share = number > 0 ? left * share_of(frame.fields[number], p) : left;
         if (share <= 0.0)
             continue;
         light += share * scattered_in(frame.fields[number], p);
         left -= share;
-    }
+    } while (--number >= 0 && left > 0.0);
     return light;
 }
 

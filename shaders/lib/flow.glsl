@@ -18,6 +18,13 @@ float leaving(vec4 lobe, int link_class_number, vec3 direction)
     return WEIGHTS[link_class_number] * lobe.x * exp(dot(lobe.yzw, direction));
 }
 
+// The built-in one takes two exponentials.
+vec3 cosh_of(vec3 x)
+{
+    vec3 e = exp(x);
+    return 0.5 * (e + 1.0 / e);
+}
+
 // The lobe of a power and flux. What leaves by all links together is the power.
 vec4 lobe_of(vec4 flow)
 {
@@ -32,7 +39,8 @@ vec4 lobe_of(vec4 flow)
     float sharpness = cosine * (3.0 - cosine * cosine) / (1.0 - cosine * cosine);
     vec4 lobe = vec4(1.0, axis * sharpness);
     // exp(K u) over the links of a class, both ways: products, since exponents add up.
-    vec3 face = cosh(lobe.yzw), edge = cosh(lobe.yzw / sqrt(2.0)), corner = cosh(lobe.yzw / sqrt(3.0));
+    vec3 face = cosh_of(lobe.yzw), edge = cosh_of(lobe.yzw / sqrt(2.0));
+    vec3 corner = cosh_of(lobe.yzw / sqrt(3.0));
     float sum = WEIGHTS[0] * 2.0 * (face.x + face.y + face.z) +
                 WEIGHTS[1] * 4.0 * dot(edge, edge.yzx) +
                 WEIGHTS[2] * 8.0 * corner.x * corner.y * corner.z;

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The frame's block, rays of a pixel, and the random numbers of a sample.
+//
+// What runs often is written for software GL (llvmpipe), too. That runs both sides of a branch; the body of
+// a loop once more than it is entered, with all lanes off, unless the condition stands at its end: hence
+// `do` where a loop is entered at least once; reads storage buffers lane by lane and number by number: hence
+// lists as texels; and divides integers lane by lane.
 #include "shared/brume_gpu.h"
 #include "lib/hash.glsl"
 
@@ -22,11 +27,24 @@ float pixel_random(ivec2 pixel, uint stream)
     return fract(start + float(frame.size.z) * 0.618033988749895);
 }
 
+// How often, and the rest. By floats, exact up to four million.
+ivec2 divided(int number, int by)
+{
+    int times = int((float(number) + 0.5) / float(by));
+    return ivec2(times, number - times * by);
+}
+
+// Which of so many a lot means; those that follow one another take turns. Of the lot 20 bits count.
+uint turn_of(uint lot, uint count)
+{
+    return uint(divided(int(lot & 0xfffffu), int(count)).y);
+}
+
 // The place of one of so many points along each side of a cube, of 1.
 vec3 point_in_cube(int number, int points)
 {
-    ivec3 at = ivec3(number % points, number / points % points, number / (points * points));
-    return (vec3(at) + 0.5) / float(points);
+    ivec2 row = divided(number, points), layer = divided(row.x, points);
+    return (vec3(row.y, layer.y, layer.x) + 0.5) / float(points);
 }
 
 struct view_ray

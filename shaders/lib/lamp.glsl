@@ -52,7 +52,8 @@ vec3 lamps_seen(view_ray ray, float t_near, float t_far, bool hit)
         t_far -= t_near;
         t_near = 0.0;
     }
-    for (uint i = 0u; i < frame.counts.x; ++i) {
+    uint i = 0u;
+    if (frame.counts.x > 0u) do {
         gpu_light light = light_at(i);
         if ((light.samples.w & LIGHT_CAMERA_VISIBLE) == 0u)
             continue;
@@ -65,6 +66,6 @@ vec3 lamps_seen(view_ray ray, float t_near, float t_far, bool hit)
         if (medium_exists())
             tau += medium_tau(ray.origin, ray.direction, t, frame.march.x, 0.5);
         sum += radiance * exp(-tau);
-    }
+    } while (++i < frame.counts.x);
     return sum;
 }

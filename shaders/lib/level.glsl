@@ -17,7 +17,7 @@ bool in_level(ivec3 cell)
 int points_in_cell(int in_all, int most)
 {
     int longest = max(level.dims.x, max(level.dims.y, level.dims.z));
-    return clamp((in_all + longest - 1) / longest, 1, most);
+    return clamp(divided(in_all + longest - 1, longest).x, 1, most);
 }
 
 // The place of one of them, of so many along a side.
@@ -29,14 +29,14 @@ vec3 point_in_cell(ivec3 cell, int number, int points)
 // Where a cell stands in a picture of a lattice with its layers as tiles, so many in a row.
 ivec2 tiled_texel(ivec3 cell, ivec3 dims, int row)
 {
-    return ivec2(cell.z % row, cell.z / row) * dims.xy + cell.xy;
+    return divided(cell.z, row).yx * dims.xy + cell.xy;
 }
 
 // The same in clip space.
 vec4 tiled_position(ivec3 cell, ivec3 dims, int row)
 {
     vec2 place = vec2(tiled_texel(cell, dims, row)) + 0.5;
-    return vec4(place / vec2(dims.xy * ivec2(row, (dims.z + row - 1) / row)) * 2.0 - 1.0, 0.5, 1.0);
+    return vec4(place / vec2(dims.xy * ivec2(row, divided(dims.z + row - 1, row).x)) * 2.0 - 1.0, 0.5, 1.0);
 }
 
 // The picture of cut links knows the cells around the lattice, too: links from there lead into it.

@@ -127,7 +127,7 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
                 int end, bool in_lattice, ivec2 pixel, float jitter)
 {
     gpu_light light = light_at(number);
-    uint turn = (uint(frame.size.z) + pixel_hash(pixel, number)) % light.samples.y;
+    uint turn = turn_of(uint(frame.size.z) + pixel_hash(pixel, number), light.samples.y);
     gpu_light_sample light_sample = light_sample_at(light.samples.x + turn);
     bool sun = light.info.x == uint(LIGHT_SUN);
     float along;
@@ -235,10 +235,11 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             break;
         }
     }
-    if (first < end && frame.paths.x != 0)
-        for (uint i = 0u; i < frame.counts.x; ++i)
-            state.direct += march_lamp(i, state.transmittance, ray, span.x, dt, first, end,
-                                       in_lattice, pixel, jitter);
+    uint i = 0u;
+    if (first < end && frame.paths.x != 0 && frame.counts.x > 0u) do
+        state.direct += march_lamp(i, state.transmittance, ray, span.x, dt, first, end,
+                                   in_lattice, pixel, jitter);
+    while (++i < frame.counts.x);
     state.transmittance = transmittance;
 }
 
@@ -278,8 +279,8 @@ void march_media(inout march_state state, view_ray ray, media_spans spans, ivec2
     float jitter = pixel_random(pixel, 11u);
     vec2 stretches[3] = vec2[](spans.before, spans.box, spans.after);
     // One call, in a loop that no compiler unrolls: three would be three times as long to compile.
-    int last = 2 + min(int(frame.march.y), 0);
-    for (int i = 0; i <= last; ++i) {
+    int i = fog_exists() ? 0 : 1, last = fog_exists() ? 2 : 1;
+    do {
         vec2 span = stretches[i];
         if (span.x >= span.y)
             continue;
@@ -287,5 +288,5 @@ void march_media(inout march_state state, view_ray ray, media_spans spans, ivec2
         int count = in_box ? max(int(ceil((span.y - span.x) / frame.march.x)), 1)
                            : int(frame.march.y);
         march(state, ray, span, count, in_box, pixel, jitter);
-    }
+    } while (++i <= last);
 }

@@ -35,10 +35,12 @@ medium_mean mean_of_medium(vec3 p, float side, int most)
     vec3 reach = vec3(0.5 * side);
     bool near = medium_exists() && all(lessThan(frame.medium_lower.xyz, p + reach)) &&
                 all(lessThan(p - reach, frame.medium_upper.xyz));
-    int points = near ? clamp(int(ceil(side / frame.medium_lower.w)), 1, most) : 0;
-    int all_ = points * points * points;
+    if (!near)
+        return m;
+    int points = clamp(int(ceil(side / frame.medium_lower.w)), 1, most);
+    int all_ = points * points * points, i = 0;
     float weights = 0.0;
-    for (int i = 0; i < all_; ++i) {
+    do {
         vec3 q = p + (point_in_cube(i, points) - 0.5) * side;
         if (!in_box(q, frame.medium_lower.xyz, frame.medium_upper.xyz))
             continue;
@@ -52,8 +54,8 @@ medium_mean mean_of_medium(vec3 p, float side, int most)
         weights += weight;
         if (frame.medium_upper.w != 0.0)
             m.emission += textureLod(medium_emission, uvw, 0.0).rgb;
-    }
-    float share = 1.0 / float(max(all_, 1));
+    } while (++i < all_);
+    float share = 1.0 / float(all_);
     m.sigma_s *= share;
     m.sigma_s_scaled *= share;
     m.sigma_t *= share;
@@ -94,14 +96,15 @@ vec3 medium_tau(vec3 origin, vec3 direction, float t_max, float step_length, flo
         return tau;
     int count = max(int(ceil((t1 - t0) / step_length)), 1);
     float dt = (t1 - t0) / float(count);
-    for (int k = 0; k < count; ++k) {
+    int k = 0;
+    do {
         vec3 p = origin + direction * (t0 + (float(k) + within) * dt);
         float skip = medium_skip(p, direction);
         if (skip > 0.0)
             k += medium_steps_to_skip(skip, dt, within);
         else
             tau += textureLod(medium_extinct, medium_coordinate(p), 0.0).rgb * dt;
-    }
+    } while (++k < count);
     return tau;
 }
 

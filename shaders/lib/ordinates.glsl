@@ -11,13 +11,6 @@ layout(std140, binding = SLOT_ORDINATES) uniform ordinates_block
     gpu_ordinates ordinates;
 };
 
-// By floats: software divides integers one by one, and takes longer for it than for all else here.
-ivec2 divided(int number, int by)
-{
-    int times = int((float(number) + 0.5) / float(by));
-    return ivec2(times, number - times * by);
-}
-
 ivec3 ordinate_texel(ivec3 cell, int number)
 {
     return cell + ivec3(0, divided(number, ordinates.count.y) * level.dims.yz);

@@ -143,15 +143,15 @@ static void around_little_fog(void **state)
 {
     (void)state;
     brume_scene *scene = little_fog();
-    brume_settings settings = settings_for(BRUME_METHOD_DOM, CELLS / 2, 0);
+    brume_settings settings = settings_for(BRUME_METHOD_DOM, CELLS, 0);
     struct field within = field_of(scene, &settings, NULL);
     assert_int_equal(within.level_count, 2);
     within.level = 1;
-    assert_true(cell_of(&within) < 0.3f * within.levels[0].lower.w);
-    settings = settings_for(BRUME_METHOD_DOM, CELLS / 2, 1);
+    assert_true(cell_of(&within) < 0.4f * within.levels[0].lower.w);
+    settings = settings_for(BRUME_METHOD_DOM, CELLS, 1);
     struct field coarse = field_of(scene, &settings, NULL);
     assert_int_equal(coarse.level_count, 1);
-    settings = settings_for(BRUME_METHOD_DOM, 2 * CELLS, 1);
+    settings = settings_for(BRUME_METHOD_DOM, 3 * CELLS, 1);
     struct field fine = field_of(scene, &settings, NULL);
     double all = 0.0, coarse_off = 0.0, within_off = 0.0;
     int cell[3];

@@ -10,7 +10,7 @@
 #define SMALL 32
 #define LARGE 64
 #define FRAMES 8 /* of the small lattice, for one of the large */
-#define ROUNDS 8 /* at most, until it is as it should be */
+#define ROUNDS 16 /* at most, until it is as it should be */
 
 struct cost {
     double parts[BRUME_FIELD_PARTS]; /* ms, a frame */

@@ -44,7 +44,7 @@ ivec2 place(int index, ivec2 sides, bool all)
     if (all)
         return divided(index, wide.x).yx - 1;
     if (index < 2 * wide.x)
-        return ivec2(index % wide.x, index < wide.x ? 0 : wide.y - 1) - 1;
+        return divided(index, wide.x).yx * ivec2(1, wide.y - 1) - 1;
     int rest = index - 2 * wide.x;
     return ivec2((rest & 1) * (wide.x - 1), rest / 2 + 1) - 1;
 }
@@ -58,6 +58,7 @@ void main()
     ivec2 at = place(int(gl_GlobalInvocationID.x), dims.yz, pass.x == 0);
     if (at.y > dims.z)
         return;
-    vec3 p = cell_centre(level, placed(axis, before, at));
-    imageStore(slice_image, slice_texel(at, number), fit_along(outside(p, number), 0.0, at.xyy, number));
+    ivec3 cell = placed(axis, before, at);
+    vec3 light = outside(cell_centre(level, cell), number);
+    imageStore(slice_image, slice_texel(at, number), fit_along(light, 0.0, cell, number));
 }

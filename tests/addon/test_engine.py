@@ -107,8 +107,8 @@ def test_light_propagation(scene, render, monkeypatch):
     render("fuzzy")
     scene.brume.cascades, scene.brume.cascade_focus = 2, 'CAMERA'
     render("cascades")
-    assert asked == [(0, 0, 0, 8, 1, 0), *((1, number, 0, 8, 1, 0) for number in range(6)),
-                     (1, 0, 1, 8, 1, 0), (1, 0, 1, 8, 2, 1)]
+    assert asked == [(0, 0, 0, 8, 0, 0), *((1, number, 0, 8, 0, 0) for number in range(6)),
+                     (1, 0, 1, 8, 0, 0), (1, 0, 1, 8, 2, 1)]
     assert found["ALL"] > 1.02 * single
     np.testing.assert_allclose(found["SINGLE"], single, rtol=1e-3)
     assert found["DIRECT"] < found["SINGLE"] <= found["SUM"] <= found["ALL"]

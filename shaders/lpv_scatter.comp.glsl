@@ -2,6 +2,7 @@
 // The light that propagation begins with: of every cell, what its medium scatters of the lights' own
 // light, and what its surfaces reflect of it. Gathered by the cell rather than strewn along the
 // lights' rays, so that many rays through one cell cost no more than one.
+// variants: SKY
 #version 450 core
 #include "lib/transmittance.glsl"
 #include "lib/shadow.glsl"
@@ -53,13 +54,13 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
         for (int c = 0; c < 3; ++c)
             flow[c] += power[c] * vec4(1.0, -g * towards);
     } while (++number < frame.counts.x);
-    if (frame.sky_dims.w != 0) {
-        vec3 uvw = sky_coordinate(p);
-        vec4 scattered = volume * vec4(1.0, vec3(g));
-        flow[0] += sigma_s.r * scattered * textureLod(sky_r, uvw, 0.0);
-        flow[1] += sigma_s.g * scattered * textureLod(sky_g, uvw, 0.0);
-        flow[2] += sigma_s.b * scattered * textureLod(sky_b, uvw, 0.0);
-    }
+#ifdef SKY
+    vec3 uvw = sky_coordinate(p);
+    vec4 scattered = volume * vec4(1.0, vec3(g));
+    flow[0] += sigma_s.r * scattered * textureLod(sky_r, uvw, 0.0);
+    flow[1] += sigma_s.g * scattered * textureLod(sky_g, uvw, 0.0);
+    flow[2] += sigma_s.b * scattered * textureLod(sky_b, uvw, 0.0);
+#endif
 }
 
 // All that a cell begins with.

@@ -147,7 +147,9 @@ static brume_result begin(struct lpv_work *work)
     laps_go(work->laps, BRUME_FIELD_SCATTERED);
     bind_textures(SLOT_REFLECTED, work->reflected);
     bind_images(SLOT_OUTPUT, work->flow[0], GL_WRITE_ONLY, GL_RGBA32F);
-    TRY(over_field(work, "lpv_scatter", (ivec4){with_media(work), work->tiles, 0, 0}));
+    const bool sky = work->input->frame->sky_dims.w != 0;
+    TRY(over_field(work, sky ? "lpv_scatter:SKY" : "lpv_scatter",
+                   (ivec4){with_media(work), work->tiles, 0, 0}));
     if (!work->around)
         TRY(in_flight(work, &work->input->stats->power_begun));
     for (int c = 0; c < 3; ++c)

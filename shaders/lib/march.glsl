@@ -187,10 +187,12 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
 {
     vec3 transmittance = state.transmittance;
     float dt = (span.y - span.x) / float(count);
+#ifndef DOM // which has the world's light in its field
     // The sky's lattice is coarser than a step.
     float sky_every = max(frame.sky_lower.w, dt);
     float sky_next = -1e30;
     vec3 sky = vec3(0.0);
+#endif
     // So is the field's, whose look-ups are dear.
     float field_every = max(0.5 * frame.fields[max(frame.field.x - 1, 0)].lower.w, dt);
     float field_next = -1e30;
@@ -209,6 +211,7 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
         end = k + 1;
         vec3 through = exp(-m.sigma_t * dt);
         vec3 weight = transmittance * step_weight(m.sigma_t, through, dt);
+#ifndef DOM
         if (frame.sky_dims.w != 0 && frame.paths.x != 0) {
             if (t >= sky_next) {
                 sky = sky_scatter(ray.origin + ray.direction * t, -ray.direction, m.g);
@@ -216,6 +219,7 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             }
             state.direct += weight * m.sigma_s * sky;
         }
+#endif
         if (field_exists() && frame.paths.y != 0) {
             if (t >= field_next) {
                 vec3 p = ray.origin + ray.direction * t;

@@ -114,7 +114,7 @@ CASES = {case.name: case for case in (
     # White media of this thickness scatter a tenth of their light more often than 64 times.
     Case('cube', (), 0.08, 256, zoom=1.4, change='milk', method='DOM', medium_only=True,
          bounces=1024),
-    Case('plume', (), 0.08, 256, zoom=1.6, method='DOM', medium_only=True),
+    Case('plume', (), 0.06, 256, zoom=1.6, method='DOM', medium_only=True),
     Case('smoke_sky', (), 0.06, 768, method='DOM', medium_only=True),
     Case('lantern', (), 0.08, 1024, method='DOM', medium_only=True),
 )}

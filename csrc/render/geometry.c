@@ -449,7 +449,8 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
         [GEOMETRY_LINKS] = "links",     [GEOMETRY_REFLECT] = "reflect"};
     const struct program *program, *opaque;
     TRY(program_draw(&gpu->programs, stems[pass], &program));
-    TRY(program_draw(&gpu->programs, pass == GEOMETRY_SHADOW ? "shadow_opaque" : stems[pass], &opaque));
+    TRY(program_draw(&gpu->programs, pass == GEOMETRY_SHADOW ? "shadow:OPAQUE" : stems[pass],
+                     &opaque));
     TRY(buffer_update(&gpu->memory, &geometry->stage_block, FOR_TARGET, sizeof *stage, stage,
                       "draw stage"));
     glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_STAGE, geometry->stage_block.id);

@@ -414,7 +414,9 @@ static int layout_field(struct renderer *renderer, const struct render_request *
         if (lattice_field_bytes(renderer, settings) <= renderer->shares.field || resolution <= 4)
             return resolution;
         /* Rather none that was not asked for than all coarser. */
-        frame->field.x = settings->cascades ? settings->cascades : 1;
+        if (settings->cascades)
+            continue;
+        frame->field.x = 1;
         if (lattice_field_bytes(renderer, settings) <= renderer->shares.field)
             return resolution;
     }

@@ -27,7 +27,7 @@ struct dom_work {
     bool has_within;               /* whether another stands in it */
     int count, axes[3];            /* ordinates: all, and by their major axes */
     vec4 directions[MOST_ORDINATES], sky[MOST_ORDINATES]; /* the world's radiance along each */
-    int across; /* tiles of theirs along z */
+    int across;                                           /* tiles of theirs along z */
     struct buffer ordinates, dots;
     struct texture sources, means, hits; /* by ordinates */
     struct texture world_means;          /* the same of the world's own light, for one within */
@@ -273,8 +273,7 @@ static brume_result come_in(struct dom_work *work, int slice, bool world)
 {
     const struct program *program;
     const struct dom_work *around = work->around;
-    const ivec4 dims = work->cells.field->dims;
-    const int sides[5] = {dims.x, dims.y, dims.z, dims.x, dims.y};
+    const int *dims = &work->cells.field->dims.x;
     TRY(program_compute(&work->cells.input->gpu->programs, "dom_border", &program));
     if (work->surroundings.id)
         glBindTextureUnit(SLOT_SURROUNDINGS, work->surroundings.id);
@@ -283,8 +282,8 @@ static brume_result come_in(struct dom_work *work, int slice, bool world)
     glProgramUniform2i(program->id, 1, around ? around->number : -1, around ? around->across : 1);
     image(SLOT_OUTPUT, &work->slices[slice % 2]);
     for (int axis = 0, begin = 0; axis < 3; begin += work->axes[axis++]) {
-        const int wide = sides[axis + 1] + 2, high = sides[axis + 2] + 2;
-        if (slice >= sides[axis])
+        const int wide = dims[(axis + 1) % 3] + 2, high = dims[(axis + 2) % 3] + 2;
+        if (slice >= dims[axis])
             continue;
         glProgramUniform4i(program->id, 0, slice, begin, axis,
                            world ? 1 + (work->surroundings.id != 0) : 0);
@@ -299,8 +298,7 @@ static brume_result come_in(struct dom_work *work, int slice, bool world)
 static brume_result sweep(struct dom_work *work, bool world)
 {
     const struct program *program;
-    const int dims[3] = {work->cells.field->dims.x, work->cells.field->dims.y,
-                         work->cells.field->dims.z};
+    const int *dims = &work->cells.field->dims.x;
     const bool open = world || work->around;
     TRY(program_compute(&work->cells.input->gpu->programs, "dom_sweep", &program));
     for (int i = 0; i < 2 && !open; ++i)

@@ -72,7 +72,7 @@ void begin(ivec3 cell)
     for (int c = 0; c < 3; ++c)
         flow[c] = texelFetch(reflected[c], texel, 0);
     if (stage.offset.x != 0) {
-        uint start = hash(uint(cell.x) + hash(uint(cell.y) + hash(uint(cell.z))));
+        uint start = hash(uint(cell_number(cell)));
         int points = points_in_cell(POINTS, 4);
         float part = side / float(points);
         int i = 0;

@@ -150,6 +150,7 @@ static brume_result begin(struct lpv_work *work)
     const bool sky = work->input->frame->sky_dims.w != 0;
     TRY(over_field(work, sky ? "lpv_scatter:SKY" : "lpv_scatter",
                    (ivec4){with_media(work), work->tiles, 0, 0}));
+    laps_go(work->laps, BRUME_FIELD_PREPARE); /* a look at it and empty sums inject nothing */
     if (!work->around)
         TRY(in_flight(work, &work->input->stats->power_begun));
     for (int c = 0; c < 3; ++c)

@@ -12,6 +12,12 @@ bool in_level(ivec3 cell)
     return in_field(level, cell);
 }
 
+// Cells in the order of their rows, layer by layer.
+int cell_number(ivec3 cell)
+{
+    return (cell.z * level.dims.y + cell.y) * level.dims.x + cell.x;
+}
+
 // Points along a cell's side that stand for what is in it: as many in all as that along the lattice's
 // longest side, at least, so that a finer lattice takes no longer to ask them.
 int points_in_cell(int in_all, int most)

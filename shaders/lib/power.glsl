@@ -10,5 +10,5 @@ layout(std430, binding = SLOT_POWERS) writeonly buffer powers_block
 
 void tell_power(ivec3 cell, vec3 power)
 {
-    powers[(cell.z * level.dims.y + cell.y) * level.dims.x + cell.x] = power.r + power.g + power.b;
+    powers[cell_number(cell)] = power.r + power.g + power.b;
 }

@@ -48,9 +48,10 @@ vec3 world_transmittance(vec3 p, vec3 towards, float within)
 
 float world_shadow(gpu_light_sample w, vec3 p, vec3 normal)
 {
-    return w.position.w < 0.0 ? 1.0
-                              : distant_shadow(int(w.position.w), frame.world.w, p, normal,
-                                               w.position.xyz);
+    int first = int(w.position.w);
+    return first < 0 ? 1.0
+                     : shadow_surface(first, first + int(frame.world.w) - 1, p, 1.0, normal,
+                                      w.position.xyz);
 }
 
 vec3 world_diffuse(surface s, vec3 p, ivec2 pixel, float within)

@@ -56,12 +56,34 @@ float shadow_test(gpu_shadow_view view, vec3 p, float bias, bool soft)
     return mix(mix(lit.w, lit.z, f.x), mix(lit.x, lit.y, f.x), f.y);
 }
 
+// The maps are from first to last: where one does not reach, the next is asked. In loops, so that software
+// does not ask all. Beyond all of them all is lit.
+
 // A point of a medium has no normal to step off along: near a surface it stays clear of the depths
 // that a texel of the map rounds.
-float shadow_medium(int number, vec3 p, float distance)
+float shadow_medium(int first, int last, vec3 p, float distance)
 {
-    gpu_shadow_view view = shadow_view(number);
-    return shadow_test(view, p, 1.5 * view.range.w * distance, false);
+    float lit;
+    do {
+        gpu_shadow_view view = shadow_view(first);
+        lit = shadow_test(view, p, 1.5 * view.range.w * distance, false);
+    } while (lit == SHADOW_OUTSIDE && ++first <= last);
+    return abs(lit);
+}
+
+// A surface moves the look-up off itself along its normal by the texel's size. The slope's share of
+// the bias is bounded: at grazing light the offset along the normal does the rest.
+float shadow_surface(int first, int last, vec3 p, float distance, vec3 normal, vec3 towards)
+{
+    float cosine = clamp(dot(normal, towards), 0.05, 1.0);
+    float slope = min(sqrt(1.0 - cosine * cosine) / cosine, 4.0);
+    float lit;
+    do {
+        gpu_shadow_view view = shadow_view(first);
+        float texel = view.range.w * distance;
+        lit = shadow_test(view, p + normal * texel, texel * (0.5 + 0.5 * slope), true);
+    } while (lit == SHADOW_OUTSIDE && ++first <= last);
+    return abs(lit);
 }
 
 // The view that sees along v (from the light), by the light's faces.
@@ -85,62 +107,33 @@ int shadow_face(gpu_light light, vec3 v)
     return q.y > 0.0 ? 3 : 4;
 }
 
-// A surface moves the look-up off itself along its normal by the texel's size. The slope's share of
-// the bias is bounded: at grazing light the offset along the normal does the rest.
-float shadow_surface(int number, vec3 p, float distance, vec3 normal, vec3 towards)
+// The maps that may see p of a light's sample. False where nothing can stand between.
+bool maps_of(gpu_light light, gpu_light_sample s, vec3 p, out int first, out int last)
 {
-    gpu_shadow_view view = shadow_view(number);
-    float texel = view.range.w * distance;
-    float cosine = clamp(dot(normal, towards), 0.05, 1.0);
-    float slope = min(sqrt(1.0 - cosine * cosine) / cosine, 4.0);
-    return shadow_test(view, p + normal * texel, texel * (0.5 + 0.5 * slope), true);
-}
-
-// Distant lights have one map, or a fine one before a wide one.
-float distant_shadow(int number, uint maps, vec3 p, vec3 normal, vec3 towards)
-{
-    float lit = shadow_surface(number, p, 1.0, normal, towards);
-    if (lit == SHADOW_OUTSIDE && maps == 2u)
-        lit = shadow_surface(number + 1, p, 1.0, normal, towards);
-    return abs(lit); // beyond all geometry: lit
-}
-
-float distant_shadow_medium(int number, uint maps, vec3 p)
-{
-    float lit = shadow_medium(number, p, 1.0);
-    if (lit == SHADOW_OUTSIDE && maps == 2u)
-        lit = shadow_medium(number + 1, p, 1.0);
-    return abs(lit);
-}
-
-// The view of a lamp's sample that sees p, -1 where nothing can stand between.
-int lamp_view(gpu_light light, gpu_light_sample s, vec3 p)
-{
-    int face = shadow_face(light, p - s.position.xyz);
+    bool sun = light.info.x == uint(LIGHT_SUN); // one map, or a fine one before a wide one
+    int face = sun ? 0 : shadow_face(light, p - s.position.xyz);
+    first = int(s.position.w) + face;
+    last = first + (sun ? int(light.samples.z) - 1 : 0);
     // No map looks behind an area light, which sends nothing there.
-    return face < int(light.samples.z) ? int(s.position.w) + face : -1;
+    return s.position.w >= 0.0 && face < int(light.samples.z);
 }
 
 float light_shadow(gpu_light light, gpu_light_sample s, vec3 p, vec3 normal)
 {
-    if (s.position.w < 0.0)
+    int first, last;
+    if (!maps_of(light, s, p, first, last))
         return 1.0;
-    if (light.info.x == uint(LIGHT_SUN))
-        return distant_shadow(int(s.position.w), light.samples.z, p, normal, s.position.xyz);
-    int number = lamp_view(light, s, p);
-    if (number < 0)
-        return 1.0;
-    vec3 v = s.position.xyz - p;
-    float distance = length(v);
-    return abs(shadow_surface(number, p, distance, normal, v / distance));
+    bool sun = light.info.x == uint(LIGHT_SUN);
+    vec3 v = sun ? s.position.xyz : s.position.xyz - p;
+    float distance = sun ? 1.0 : length(v);
+    return shadow_surface(first, last, p, distance, normal, v / distance);
 }
 
+// distance: how far a lamp is from p, of no account for suns.
 float light_shadow_medium(gpu_light light, gpu_light_sample s, vec3 p, float distance)
 {
-    if (s.position.w < 0.0)
+    int first, last;
+    if (!maps_of(light, s, p, first, last))
         return 1.0;
-    if (light.info.x == uint(LIGHT_SUN))
-        return distant_shadow_medium(int(s.position.w), light.samples.z, p);
-    int number = lamp_view(light, s, p);
-    return number < 0 ? 1.0 : abs(shadow_medium(number, p, distance));
+    return shadow_medium(first, last, p, light.info.x == uint(LIGHT_SUN) ? 1.0 : distance);
 }

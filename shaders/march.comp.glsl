@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The view ray of every pixel through the media.
-// variants: DOM
+// variants: DOM DOM_LAMPS
 #version 450 core
 #include "lib/compose.glsl"
 

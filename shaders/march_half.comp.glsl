@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One view ray of every block of 2 x 2 pixels through the media, for march_upsample.
-// variants: DOM
+// variants: DOM DOM_LAMPS
 #version 450 core
 #include "lib/half.glsl"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The view rays of those pixels that the rays of the blocks around them do not stand for.
-// variants: DOM
+// variants: DOM DOM_LAMPS
 #version 450 core
 #include "lib/compose.glsl"
 #include "lib/rest.glsl"

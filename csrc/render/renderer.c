@@ -290,8 +290,10 @@ static brume_result work_march(struct run *run)
 {
     const vec4 march = run->renderer->frame.march;
     const struct render_request *request = run->request;
-    return view_march(run->gpu, request->targets, &request->view,
-                      request->settings.method == BRUME_METHOD_DOM, (int)march.z, (int)march.w);
+    enum view_march_kind kind = VIEW_MARCH;
+    if (request->settings.method == BRUME_METHOD_DOM)
+        kind = run->renderer->frame.counts.x ? VIEW_MARCH_DOM_LAMPS : VIEW_MARCH_DOM;
+    return view_march(run->gpu, request->targets, &request->view, kind, (int)march.z, (int)march.w);
 }
 
 /* Reads the mean of the samples so far and makes it the newest picture. */

@@ -6,6 +6,7 @@
 #include "render/filter.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -325,16 +326,26 @@ brume_result view_shade(struct gpu *gpu, const brume_view *view, int first, int 
     return BRUME_OK;
 }
 
+static brume_result march_program(struct gpu *gpu, const char *stem, enum view_march_kind kind,
+                                  const struct program **program)
+{
+    static const char *const variants[] = {"", ":DOM", ":DOM_LAMPS"};
+    char name[32];
+    snprintf(name, sizeof name, "%s%s", stem, variants[kind]);
+    return program_compute(&gpu->programs, name, program);
+}
+
 /* The rays of blocks, the pixels between them, and those that no block stands for. */
 static brume_result march_half(struct gpu *gpu, const struct view_targets *targets,
-                               const brume_view *view, bool dom, int first, int end)
+                               const brume_view *view, enum view_march_kind kind, int first,
+                               int end)
 {
     static const GLuint none[4] = {0, 1, 1, 0}; /* groups, and pixels */
     const int rows = HALF_ROWS(end, view->height) - HALF_ROWS(first, view->height);
     const struct program *blocks, *upsample, *rest;
-    TRY(program_compute(&gpu->programs, dom ? "march_half:DOM" : "march_half", &blocks));
+    TRY(march_program(gpu, "march_half", kind, &blocks));
     TRY(program_compute(&gpu->programs, "march_upsample", &upsample));
-    TRY(program_compute(&gpu->programs, dom ? "march_rest:DOM" : "march_rest", &rest));
+    TRY(march_program(gpu, "march_rest", kind, &rest));
     if (rows > 0)
         program_dispatch(blocks, (view->width + 1) / 2, rows, 1);
     glNamedBufferSubData(targets->rest.id, 0, sizeof none, none);
@@ -347,12 +358,12 @@ static brume_result march_half(struct gpu *gpu, const struct view_targets *targe
 }
 
 brume_result view_march(struct gpu *gpu, const struct view_targets *targets, const brume_view *view,
-                        bool dom, int first, int end)
+                        enum view_march_kind kind, int first, int end)
 {
     if (view->half_march)
-        return march_half(gpu, targets, view, dom, first, end);
+        return march_half(gpu, targets, view, kind, first, end);
     const struct program *program;
-    TRY(program_compute(&gpu->programs, dom ? "march:DOM" : "march", &program));
+    TRY(march_program(gpu, "march", kind, &program));
     program_dispatch(program, view->width, end - first, 1);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     return BRUME_OK;

@@ -195,8 +195,8 @@ vec4 scattered_at(gpu_field field, vec3 at)
     return textureLod(scattered_lattice, at / vec3(textureSize(scattered_lattice, 0)), 0.0);
 }
 
-// The same as the cells of one of DOM's lattices scatter it, per unit of sigma_s. Where no surface is near
-// the texture's own interpolation does.
+// The same as the cells of one of DOM's lattices scatter it, per unit of sigma_s: of the cells on the point's
+// side of surfaces, where these are near.
 vec3 scattered_in(gpu_field field, vec3 p)
 {
     vec3 at = (p - field.lower.xyz) / field.lower.w;
@@ -207,15 +207,16 @@ vec3 scattered_in(gpu_field field, vec3 p)
         vec3 before = scattered_at(field, clamp(2.0 * last - at, vec3(0.5), vec3(field.dims.xyz) - 0.5)).rgb;
         light.rgb = clamp(2.0 * light.rgb - before, vec3(0.0), 2.0 * light.rgb);
     }
+    if (light.w <= 0.0)
+        return light.rgb;
+    cells_between cells = cells_around(field, p);
     vec4 sum = vec4(0.0);
-    if (light.w > 0.0) {
-        cells_between cells = cells_around(field, p);
-        for (int corner = 0; corner < 8; ++corner) {
-            ivec3 cell;
-            float weight = share_of_cell(cells, field, corner, vec4(0.0, 0.0, 0.0, -1.0), cell);
-            sum += weight * vec4(texelFetch(scattered_lattice, texel_of(field, cell, 0), 0).rgb, 1.0);
-        }
-    }
+    int corner = 0;
+    do {
+        ivec3 cell;
+        float weight = share_of_cell(cells, field, corner, vec4(0.0, 0.0, 0.0, -1.0), cell);
+        sum += weight * vec4(texelFetch(scattered_lattice, texel_of(field, cell, 0), 0).rgb, 1.0);
+    } while (++corner < 8);
     return sum.w > 1e-3 ? sum.rgb / sum.w : light.rgb;
 }
 
@@ -234,6 +235,21 @@ vec3 field_scattered(vec3 p)
         left -= share;
     } while (--number >= 0 && left > 0.0);
     return light;
+}
+
+// Where one look-up of the finest lattice's own interpolation tells all: well within it, far from surfaces.
+bool field_scattered_open(gpu_field finest, vec3 p, out vec3 light)
+{
+    light = vec3(0.0);
+    if (!field_reaches(p))
+        return true;
+    vec3 at = (p - finest.lower.xyz) / finest.lower.w;
+    if (any(lessThan(at, vec3(0.5))) || any(greaterThan(at, vec3(finest.dims.xyz) - 0.5)) ||
+        frame.field.x > 1 && share_of(finest, p) < 1.0)
+        return false;
+    vec4 there = scattered_at(finest, at);
+    light = there.rgb;
+    return there.w <= 0.0;
 }
 
 vec3 field_irradiance(field_light light, vec3 normal)

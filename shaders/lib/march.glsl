@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A view ray through the media: in-scattered and emitted light, transmittance.
+#ifdef DOM_LAMPS
+#define DOM
+#define LAMPS // there are some
+#endif
+
 #include "lib/transmittance.glsl"
 #include "lib/shadow.glsl"
 #include "lib/sky.glsl"
@@ -121,64 +126,104 @@ float step_jitter(float jitter, int k)
     return fract(jitter + float(k) * 0.754877666);
 }
 
+// A lamp's sample as a ray's steps see it.
+struct lamp_ray
+{
+    gpu_light light;
+    gpu_light_sample light_sample;
+    bool sun;
+    float along, h; // as nearest_approach() has them
+};
+
+lamp_ray lamp_along(uint number, view_ray ray, ivec2 pixel)
+{
+    lamp_ray lamp;
+    lamp.light = light_at(number);
+    uint turn = turn_of(uint(frame.size.z) + pixel_hash(pixel, number), lamp.light.samples.y);
+    lamp.light_sample = light_sample_at(lamp.light.samples.x + turn);
+    lamp.sun = lamp.light.info.x == uint(LIGHT_SUN);
+    lamp.h = nearest_approach(lamp.light, lamp.light_sample, ray, lamp.along);
+    return lamp;
+}
+
+// What reaches the eye of what a step scatters. Where a strong forward peak counts as not scattered, the
+// light in the peak itself (sharp) is seen as far as it is scattered no more, be it forwards: light in the
+// peak that was scattered twice and more is what the lesser depth towards the lamp adds.
+struct march_reach
+{
+    vec3 soft;
+#ifdef DOM
+    vec3 sharp;
+#endif
+};
+
+// What a lamp adds in a step from t0 on that is seen at t; what comes from behind it has less reach.
+vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, float t0, float t, float dt,
+               inout march_reach reach)
+{
+    vec3 through = exp(-m.sigma_t * dt);
+#ifdef DOM
+    vec3 sharp_t = m.sigma_t + forward_share(m.g) * m.sigma_s;
+    vec3 sharp_through = exp(-sharp_t * dt);
+#endif
+    vec3 p = ray.origin + ray.direction * t;
+    vec3 towards;
+    float square;
+    vec3 intensity = light_intensity(lamp.light, lamp.light_sample.position.xyz, p, towards, square);
+    float distance = lamp.sun ? 1e30 : sqrt(square);
+    if (intensity != vec3(0.0))
+        intensity *= light_shadow_medium(lamp.light, lamp.light_sample, p, distance);
+    vec3 sum = vec3(0.0);
+    if (intensity != vec3(0.0)) {
+        if (!lamp.sun)
+            intensity *= mean_inverse_square(t0 - lamp.along, t0 + dt - lamp.along, lamp.h);
+        vec3 here = m.sigma_s * intensity * light_transmittance(lamp.light, p, towards, distance);
+        float cosine = dot(towards, ray.direction), phase = phase_hg(cosine, m.g);
+#ifdef DOM
+        // Its lobes below 0 are no light: with what is behind them they could outweigh the peak.
+        float soft = max(phase_truncated(cosine, m.g), 0.0);
+        sum = here * (reach.soft * step_weight(m.sigma_t, through, dt) * soft +
+                      reach.sharp * step_weight(sharp_t, sharp_through, dt) * (phase - soft));
+#else
+        sum = here * (reach.soft * step_weight(m.sigma_t, through, dt) * phase);
+#endif
+    }
+    reach.soft *= through;
+#ifdef DOM
+    reach.sharp *= sharp_through;
+#endif
+    return sum;
+}
+
+march_reach reach_of(vec3 transmittance)
+{
+#ifdef DOM
+    return march_reach(transmittance, transmittance);
+#else
+    return march_reach(transmittance);
+#endif
+}
+
 // What one lamp adds along the steps from first to end, which start at t_start. Lamps are the outer
 // loop: their data are read once a ray.
 vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, float dt, int first,
                 int end, bool in_lattice, ivec2 pixel, float jitter)
 {
-    gpu_light light = light_at(number);
-    uint turn = turn_of(uint(frame.size.z) + pixel_hash(pixel, number), light.samples.y);
-    gpu_light_sample light_sample = light_sample_at(light.samples.x + turn);
-    bool sun = light.info.x == uint(LIGHT_SUN);
-    float along;
-    float h = nearest_approach(light, light_sample, ray, along);
-    // Where a strong forward peak counts as not scattered, the light in the peak itself is seen as far as
-    // it is scattered no more, be it forwards: light in the peak that was scattered twice and more is
-    // what the lesser depth towards the lamp adds.
-#ifdef DOM
-    vec3 sharp = transmittance;
-#endif
+    lamp_ray lamp = lamp_along(number, ray, pixel);
+    march_reach reach = reach_of(transmittance);
     vec3 sum = vec3(0.0);
-    for (int k = first; k < end; ++k) {
+    int k = first;
+    do {
         float within = step_jitter(jitter, k);
         float t0 = t_start + float(k) * dt;
         float t = t0 + within * dt;
         medium_step m;
         int skipped;
-        if (!look_up(ray, t, dt, within, in_lattice, false, m, skipped)) {
-            k += skipped;
-            continue;
-        }
-        vec3 through = exp(-m.sigma_t * dt);
-        vec3 p = ray.origin + ray.direction * t;
-        vec3 towards;
-        float square;
-        vec3 light_here = light_intensity(light, light_sample.position.xyz, p, towards, square);
-        float distance = sun ? 1e30 : sqrt(square);
-        if (light_here != vec3(0.0))
-            light_here *= light_shadow_medium(light, light_sample, p, distance);
-        if (light_here != vec3(0.0)) {
-            if (!sun)
-                light_here *= mean_inverse_square(t0 - along, t0 + dt - along, h);
-            vec3 here = m.sigma_s * light_here * light_transmittance(light, p, towards, distance);
-            float cosine = dot(towards, ray.direction), phase = phase_hg(cosine, m.g);
-#ifdef DOM
-            // Its lobes below 0 are no light: with what is behind them they could outweigh the peak.
-            float soft = max(phase_truncated(cosine, m.g), 0.0);
-            vec3 sigma_t = m.sigma_t + forward_share(m.g) * m.sigma_s;
-            vec3 sharp_through = exp(-sigma_t * dt);
-            sum += here * (transmittance * step_weight(m.sigma_t, through, dt) * soft +
-                           sharp * step_weight(sigma_t, sharp_through, dt) * (phase - soft));
-#else
-            sum += transmittance * step_weight(m.sigma_t, through, dt) * here * phase;
-#endif
-        }
-        transmittance *= through;
-#ifdef DOM
-        sharp *= exp(-(m.sigma_t + forward_share(m.g) * m.sigma_s) * dt);
-#endif
-    }
-    return sum * light.factors.z;
+        if (look_up(ray, t, dt, within, in_lattice, false, m, skipped))
+            sum += lamp_step(lamp, ray, m, t0, t, dt, reach);
+        k += skipped;
+    } while (++k < end);
+    return sum * lamp.light.factors.z;
 }
 
 // Transmittance, emission, the world's light and the lamps' along the stretch.
@@ -194,53 +239,82 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
     vec3 sky = vec3(0.0);
 #endif
     // So is the field's, whose look-ups are dear.
-    float field_every = max(0.5 * frame.fields[max(frame.field.x - 1, 0)].lower.w, dt);
+    gpu_field finest = frame.fields[max(frame.field.x - 1, 0)];
+    float field_every = max(0.5 * finest.lower.w, dt);
     float field_next = -1e30;
     vec3 field = vec3(0.0);
+    bool with_field = field_exists() && frame.paths.y != 0;
+#ifdef LAMPS
+    // The first lamp takes these steps along: it need not look up what is there once more.
+    lamp_ray lamp = lamp_along(0u, ray, pixel);
+    march_reach reach = reach_of(transmittance);
+    vec3 lamp_sum = vec3(0.0);
+#endif
     int first = count, end = 0; // the steps that are not empty
-    for (int k = 0; k < count; ++k) {
-        float within = step_jitter(jitter, k);
-        float t = span.x + (float(k) + within) * dt;
-        medium_step m;
-        int skipped;
-        if (!look_up(ray, t, dt, within, in_lattice, true, m, skipped)) {
-            k += skipped;
-            continue;
-        }
-        first = min(first, k);
-        end = k + 1;
-        vec3 through = exp(-m.sigma_t * dt);
-        vec3 weight = transmittance * step_weight(m.sigma_t, through, dt);
+    int k = 0;
+    do {
+        bool open = true; // else one look-up did not tell the last step's field
+        vec3 p, scattered;
+        do {
+            float within = step_jitter(jitter, k);
+            float t0 = span.x + float(k) * dt, t = t0 + within * dt;
+            medium_step m;
+            int skipped;
+            if (!look_up(ray, t, dt, within, in_lattice, true, m, skipped)) {
+                k += skipped;
+                continue;
+            }
+            first = min(first, k);
+            end = k + 1;
+            vec3 through = exp(-m.sigma_t * dt);
+            vec3 weight = transmittance * step_weight(m.sigma_t, through, dt);
+            p = ray.origin + ray.direction * t;
+            scattered = weight * m.sigma_s;
 #ifndef DOM
-        if (frame.sky_dims.w != 0 && frame.paths.x != 0) {
-            if (t >= sky_next) {
-                sky = sky_scatter(ray.origin + ray.direction * t, -ray.direction, m.g);
-                sky_next = t + sky_every;
+            if (frame.sky_dims.w != 0 && frame.paths.x != 0) {
+                if (t >= sky_next) {
+                    sky = sky_scatter(p, -ray.direction, m.g);
+                    sky_next = t + sky_every;
+                }
+                state.direct += scattered * sky;
             }
-            state.direct += weight * m.sigma_s * sky;
-        }
 #endif
-        if (field_exists() && frame.paths.y != 0) {
-            if (t >= field_next) {
-                vec3 p = ray.origin + ray.direction * t;
+            if (with_field) {
+                if (t >= field_next) {
 #ifdef DOM
-                field = field_scattered(p);
+                    open = field_scattered_open(finest, p, field);
 #else
-                field = field_scatter(p, -ray.direction, m.g);
+                    field = field_scatter(p, -ray.direction, m.g);
 #endif
-                field_next = t + field_every;
+                    field_next = t + field_every;
+                }
+                if (open)
+                    state.indirect += scattered * field;
             }
-            state.indirect += weight * m.sigma_s * field;
+            state.emission += weight * m.emission;
+#ifdef LAMPS
+            lamp_sum += lamp_step(lamp, ray, m, t0, t, dt, reach);
+#endif
+            transmittance *= through;
+            if (is_black(transmittance)) {
+                transmittance = vec3(0.0);
+                k = count;
+            }
+        } while (++k < count && open);
+#ifdef DOM
+        if (!open) {
+            field = field_scattered(p);
+            state.indirect += scattered * field;
         }
-        state.emission += weight * m.emission;
-        transmittance *= through;
-        if (is_black(transmittance)) {
-            transmittance = vec3(0.0);
-            break;
-        }
-    }
+#endif
+    } while (k < count);
     uint i = 0u;
-    if (first < end && frame.paths.x != 0 && frame.counts.x > 0u) do
+#ifdef LAMPS
+    if (frame.paths.x != 0)
+        state.direct += lamp_sum * lamp.light.factors.z;
+    ++i;
+#endif
+    if (first < end && frame.paths.x != 0 && i < frame.counts.x) do
         state.direct += march_lamp(i, state.transmittance, ray, span.x, dt, first, end,
                                    in_lattice, pixel, jitter);
     while (++i < frame.counts.x);

@@ -295,7 +295,7 @@ static int by_value(const void *a, const void *b)
 static void half_takes_a_third(void **state)
 {
     (void)state;
-    enum { ROUNDS = 9 };
+    enum { ROUNDS = 15 };
     static const struct coefficients thin = {.sigma_s = {0.2f, 0.2f, 0.2f}};
     brume_scene *scene;
     assert_ok(brume_scene_create(device, &scene));
@@ -303,7 +303,7 @@ static void half_takes_a_third(void **state)
     for (int i = 0; i < 4; ++i)
         add_lamp(scene, (uint64_t)i, (float)i - 1.5f, 0.3f, 0.5f, 20.0f);
     add_cube(scene, 1, origin, 0.4f, BRUME_VISIBLE_CAMERA | BRUME_VISIBLE_SHADOW);
-    const brume_view view = view_of(192, 192, 1);
+    const brume_view view = view_of(384, 384, 1);
     double ratios[ROUNDS], full[ROUNDS];
     for (int round = -1; round < ROUNDS; ++round) {
         const double whole = march_ms(scene, view, 0), half = march_ms(scene, view, 1);

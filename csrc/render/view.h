@@ -44,8 +44,9 @@ brume_result view_gbuffer(struct gpu *gpu, struct view_targets *targets, struct 
  * first to the one before the end, multiples of GROUP_PIXELS but for the picture's own end. */
 void view_bind(const struct view_targets *targets);
 brume_result view_shade(struct gpu *gpu, const brume_view *view, int first, int end);
-/* With VIEW_MARCH_DOM media take the field from the lattice of what cells scatter towards the eye, and strong
- * forward scattering counts as none in all optical depths (delta-M); the same with lamps, for some. */
+/* With VIEW_MARCH_DOM media take the field from the lattice of what cells scatter towards the eye, and
+ * strong forward scattering counts as none in all optical depths (delta-M); VIEW_MARCH_DOM_LAMPS is
+ * the same where there are lamps. */
 enum view_march_kind { VIEW_MARCH, VIEW_MARCH_DOM, VIEW_MARCH_DOM_LAMPS };
 brume_result view_march(struct gpu *gpu, const struct view_targets *targets, const brume_view *view,
                         enum view_march_kind kind, int first, int end);

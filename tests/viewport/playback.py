@@ -68,11 +68,11 @@ def toggle_playback(area):
         bpy.ops.screen.animation_play()
 
 
-def played(area, seconds, most_frames, most_scenes):
-    """Plays, until there were more frames and pictures of more scenes than these, but so long at
-    least, and waits for the view's rest; gives the frames that Blender came to, and the scenes of
-    the pictures that the view showed, while it played and after that. How fast a machine plays is
-    not asked here; one that never gets there runs out of the scenario's time."""
+def played(area, seconds, frames_wanted, scenes_wanted):
+    """Plays so long, and on until there were so many frames and pictures of so many scenes, and
+    waits for the view's rest; gives the frames that Blender came to, and the scenes of the pictures
+    that the view showed, while it played and after that. How fast a machine plays is not asked
+    here; one that never gets there runs out of the scenario's time."""
     frames = []
 
     def note(scene, *_):
@@ -82,9 +82,9 @@ def played(area, seconds, most_frames, most_scenes):
     with traced() as events:
         toggle_playback(area)
         yield seconds
-        yield lambda: (len(frames) > most_frames and
+        yield lambda: (len(frames) >= frames_wanted and
                        len({values.get("scene") for *_, values in of_kind(events, "draw")}
-                           - {None}) > most_scenes)
+                           - {None}) >= scenes_wanted)
         toggle_playback(area)
         bpy.app.handlers.frame_change_post.remove(note)
         drawn = len(of_kind(events, "draw"))
@@ -104,7 +104,9 @@ def volume_sequence():
         sequence_in_the_cube(Path(folder))
         yield from rendered_views()
         first = shown(region)
-        frames, (scenes, after) = yield from played(area, 5.0, FRAMES, 4)
+        frames, (scenes, after) = yield from played(area, 5.0, FRAMES + 1, 5)
+        assert len(frames) > FRAMES, f"it did not play: {frames}"
+        assert len(set(scenes)) > 4, f"pictures of {len(set(scenes))} frames alone"
         assert scenes == sorted(scenes), "an older picture came after a newer one"
         # Then come the picture and the file that were under way, and the last frame.
         assert len({*after} - {*scenes}) <= 3, f"{after} after {scenes[-1]}"
@@ -150,8 +152,9 @@ def simulation():
         smoking(Path(folder))
         yield from rendered_views()
         first = shown(region)
-        frames, (scenes, _) = yield from played(area, 6.0, 8, 4)
+        frames, (scenes, _) = yield from played(area, 6.0, 9, 5)
         assert len(set(frames)) > 8, f"it did not play: {frames}"
+        assert len(set(scenes)) > 4, f"pictures of {len(set(scenes))} frames alone"
         different(shown(region), first, "after a while")
         found = as_rendered(region, "the simulation where it stopped")
         bpy.data.objects.remove(bpy.data.objects["Domain"])

@@ -4,6 +4,7 @@
 // forward scattering counts as none, as everywhere with DOM: extinction comes scaled.
 #version 450 core
 #include "lib/medium.glsl"
+#include "lib/ordinates.glsl"
 #include "lib/walls.glsl"
 #include "lib/harmonics.glsl"
 
@@ -16,7 +17,7 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
 
 layout(binding = SLOT_LINKS) uniform usampler3D links;
 
-layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D cell_image[3]; // extinction; albedo,
+layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D cell_image[3]; // extinction; absorbed share,
                                                        // mean cosine; surfaces' reflectance
 layout(binding = SLOT_OUTPUT_FIELD, r32ui) writeonly uniform uimage3D cuts_image;
 layout(binding = SLOT_OUTPUT_FIELD + 1, rgba16f) writeonly uniform image3D depths_image; // of cells, by
@@ -51,10 +52,12 @@ void main()
     for (int i = 0; i < 13; ++i)
         cuts |= (texelFetch(links, links_texel(cell - LINKS[i]), 0).r >> i & 1u) << (13 + i);
     extinct = clamp(extinct, vec3(0.0), vec3(65504.0));
-    imageStore(cell_image[0], cell, vec4(extinct, 0.0));
+    imageStore(cell_image[0], cell, fit(extinct, 0.0));
     vec3 albedo = clamp(scatter / max(extinct, vec3(1e-12)), 0.0, 1.0);
     float g = g_sum / max(g_weight, 1e-12);
-    imageStore(cell_image[1], cell, vec4(albedo, g));
+    // As what it lacks to 1: halves near 1 are too coarse, and of light that is scattered a hundred times
+    // each counts.
+    imageStore(cell_image[1], cell, fit(1.0 - albedo, scatter == vec3(0.0) ? EMPTY : g));
     vec3 turns = extinct * (1.0 - albedo * scaled_bands(g).y) * side;
     imageStore(depths_image, cell, vec4(clamp(turns, vec3(THINNEST), vec3(65504.0)), 0.0));
     imageStore(cell_image[2], cell, vec4(mean_of_walls(cell, 0), 0.0));

@@ -12,7 +12,7 @@ layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GR
 layout(location = 0) uniform vec2 weights; // of the last step's change, and of what is wrong
 
 layout(binding = SLOT_CELL_EXTINCT) uniform sampler3D cell_extinct;
-layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_albedo;
+layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_absorbed;
 layout(binding = SLOT_MISSING + 1) uniform sampler3D missing_before;
 layout(binding = SLOT_MOMENTS) uniform sampler3D residual;
 
@@ -25,8 +25,8 @@ void main()
         return;
     diffusing c = diffusing_cell(cell, residual);
     vec3 depth = texelFetch(cell_extinct, cell, 0).rgb * level.lower.w;
-    vec3 albedo = texelFetch(cell_albedo, cell, 0).rgb;
-    vec3 comes = albedo * depth * texelFetch(residual, cell, 0).rgb, goes = (1.0 - albedo) * depth;
+    vec3 absorbed = texelFetch(cell_absorbed, cell, 0).rgb;
+    vec3 comes = (1.0 - absorbed) * depth * texelFetch(residual, cell, 0).rgb, goes = absorbed * depth;
     for (int i = 0; i < 6; ++i) {
         vec3 from;
         goes += passes_side(cell, i, c, from);

@@ -15,7 +15,7 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
 layout(binding = SLOT_MOMENTS) uniform sampler3D moments;
 layout(binding = SLOT_MOMENTS + 1) uniform sampler3D world_moments;
 layout(binding = SLOT_CUTS) uniform usampler3D cell_cuts;
-layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_albedo;
+layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_absorbed;
 layout(binding = SLOT_WALLS) uniform usampler3D walls;
 layout(binding = SLOT_CELL_WALLS) uniform sampler3D cell_walls;
 
@@ -29,8 +29,7 @@ void main()
     if (!in_level(cell) || cell.z >= stage.slab.w)
         return;
     vec3 own[MOMENTS];
-    vec4 scatter = texelFetch(cell_albedo, cell, 0);
-    float g = scatter.rgb == vec3(0.0) ? EMPTY : scatter.w;
+    float g = texelFetch(cell_absorbed, cell, 0).w;
     for (int m = 0; m < MOMENTS; ++m) {
         ivec3 texel = moment_texel(cell, m);
         own[m] = texelFetch(moments, texel, 0).rgb;

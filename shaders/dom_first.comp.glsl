@@ -16,7 +16,7 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
 };
 
 layout(binding = SLOT_CELL_EXTINCT) uniform sampler3D cell_extinct;
-layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_albedo;
+layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_absorbed;
 layout(binding = SLOT_MOMENTS) uniform sampler3D world_moments;
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D first_image;
@@ -82,10 +82,10 @@ void main()
         for (int m = 0; m < MOMENTS; ++m)
             q[m] *= per;
         if (stage.offset.x != 0) {
-            vec4 scatter = texelFetch(cell_albedo, cell, 0);
-            vec4 bands = scaled_bands(scatter.w);
+            vec4 absorbed = texelFetch(cell_absorbed, cell, 0);
+            vec4 bands = scaled_bands(absorbed.w);
             for (int m = 0; m < MOMENTS; ++m)
-                q[m] += scatter.rgb * bands[band_of(m)] *
+                q[m] += (1.0 - absorbed.rgb) * bands[band_of(m)] *
                         texelFetch(world_moments, moment_texel(cell, m), 0).rgb;
         }
     }

@@ -13,7 +13,7 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
 };
 
 layout(binding = SLOT_CELL_EXTINCT) uniform sampler3D cell_extinct;
-layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_albedo;
+layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_absorbed;
 layout(binding = SLOT_MOMENTS) uniform sampler3D moments;
 layout(binding = SLOT_MOMENTS + 1) uniform sampler3D first;
 
@@ -26,12 +26,13 @@ void main()
         return;
     vec3 extinct = texelFetch(cell_extinct, cell, 0).rgb;
     float medium = max(extinct.r, max(extinct.g, extinct.b)) > 0.0 ? 1.0 : 0.0;
-    vec4 scatter = texelFetch(cell_albedo, cell, 0);
-    vec4 bands = scaled_bands(scatter.w);
+    vec4 absorbed = texelFetch(cell_absorbed, cell, 0);
+    vec3 albedo = 1.0 - absorbed.rgb;
+    vec4 bands = scaled_bands(absorbed.w);
     vec3 q[MOMENTS];
     for (int m = 0; m < MOMENTS; ++m)
         q[m] = texelFetch(first, moment_texel(cell, m), 0).rgb +
-               scatter.rgb * bands[band_of(m)] * texelFetch(moments, moment_texel(cell, m), 0).rgb;
+               albedo * bands[band_of(m)] * texelFetch(moments, moment_texel(cell, m), 0).rgb;
     for (int k = 0; k < ordinates.count.x; ++k) {
         vec3 sum = vec3(0.0);
         for (int i = 0; i < MOMENTS / 4; ++i) {

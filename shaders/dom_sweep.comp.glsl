@@ -42,6 +42,22 @@ vec3 growth(ivec3 cell, int number, vec3 way, vec4 own, uint cuts)
     return clamp(sum, -2.0 * abs(own.rgb), 2.0 * abs(own.rgb));
 }
 
+// How much the light that leaves a slice of cells grows from one to the next, in a column between two others.
+// w: 0 beyond the lattice, 1 with surfaces, else up to 2: how far it counts.
+vec3 rises(vec4 low, vec4 own, vec4 high)
+{
+    float has_low = min(low.w, 1.0), has_high = min(high.w, 1.0);
+    vec3 slope = (high.rgb - own.rgb) * has_high + (own.rgb - low.rgb) * has_low;
+    slope *= max(own.w - 1.0, 0.0) / max(has_low + has_high, 1.0);
+    return clamp(slope, -2.0 * abs(own.rgb), 2.0 * abs(own.rgb));
+}
+
+// The light of a place in the slice before, or around it.
+vec4 column(ivec2 at, ivec3 dims, int number)
+{
+    return texelFetch(slice_before, slice_texel(clamp(at, ivec2(-1), dims.yz), number), 0);
+}
+
 void main()
 {
     int axis = pass.z, number = pass.y + int(gl_WorkGroupID.z);
@@ -60,12 +76,21 @@ void main()
     vec4 shares = vec4(1.0 - aside.x, aside.x, 1.0 - aside.x, aside.x) *
                   vec4(1.0 - aside.yy, aside.yy);
     vec3 wall = texelFetch(cell_walls, cell, 0).rgb, enters = vec3(0.0);
+    vec4 comes[4];
     float stopped = 0.0;
     for (int i = 0; i < 4; ++i) {
-        vec3 comes = texelFetch(slice_before, slice_texel(at - turn * aside_of(i), number), 0).rgb;
+        comes[i] = column(at - turn * aside_of(i), dims, number);
         bool cut = (cuts & ordinates.list[number].links_in[i]) != 0u;
-        enters += shares[i] * (cut ? wall : comes);
+        enters += shares[i] * (cut ? wall : comes[i].rgb);
         stopped += (cuts & ordinates.list[number].links_out[i]) != 0u ? shares[i] : 0.0;
+    }
+    // The part of a column that goes aside is its side there, and light that grows is more in it.
+    for (int i = 0; i < 2; ++i) {
+        ivec2 step_ = turn * ivec2(1 - i, i);
+        vec4 far = column(at - 2 * step_, dims, number), near = comes[1 + i];
+        vec4 ahead = column(at + step_, dims, number);
+        enters += 0.5 * aside[i] * (1.0 - aside[i]) *
+                  (rises(far, near, comes[0]) - rises(near, comes[0], ahead));
     }
     enters = pass.w != 0 ? max(enters, vec3(0.0)) : enters;
 
@@ -84,7 +109,10 @@ void main()
     vec3 mean = mix(source.rgb + (enters - leaves) / max(depth, vec3(1e-6)),
                     enters * (1.0 - 0.5 * depth) + source.rgb * (0.5 * depth),
                     lessThan(depth, vec3(3e-3)));
-    imageStore(slice_image, slice_texel(at, number), fit_along(leaves, 0.0, cell, number));
+    // In thin media it does not count how light grows: taken as even it spreads aside, which hides that it
+    // goes along few ordinates; in thick ones scattering does that.
+    float counts = cuts == 0u ? clamp(8.0 * max(depth.r, max(depth.g, depth.b)), 0.0, 1.0) : 0.0;
+    imageStore(slice_image, slice_texel(at, number), fit_along(leaves, 1.0 + counts, cell, number));
     imageStore(mean_image, ordinate_texel(cell, number), fit_along(mean, 0.0, cell, number));
     if (cuts != 0u && pass.w == 0)
         imageStore(hits_image, ordinate_texel(cell, number), fit(leaves * stopped, stopped));

@@ -226,6 +226,13 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
     return sum * lamp.light.factors.z;
 }
 
+// Where a lattice whose cells are longer than steps is asked for so many of these, the first of them at t: in
+// their middle. Asked at the first, light that grows behind a lit face would come too late.
+vec3 middle_of(view_ray ray, float t, int steps, float dt, float t_end)
+{
+    return ray.origin + ray.direction * min(t + 0.5 * float(steps - 1) * dt, t_end);
+}
+
 // Transmittance, emission, the world's light and the lamps' along the stretch.
 void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_lattice,
            ivec2 pixel, float jitter)
@@ -234,14 +241,12 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
     float dt = (span.y - span.x) / float(count);
 #ifndef DOM // which has the world's light in its field
     // The sky's lattice is coarser than a step.
-    float sky_every = max(frame.sky_lower.w, dt);
-    float sky_next = -1e30;
+    int sky_steps = max(int(frame.sky_lower.w / dt + 0.5), 1), sky_next = 0;
     vec3 sky = vec3(0.0);
 #endif
     // So is the field's, whose look-ups are dear.
     gpu_field finest = frame.fields[max(frame.field.x - 1, 0)];
-    float field_every = max(0.5 * finest.lower.w, dt);
-    float field_next = -1e30;
+    int field_steps = max(int(0.5 * finest.lower.w / dt + 0.5), 1), field_next = 0;
     vec3 field = vec3(0.0);
     bool with_field = field_exists() && frame.paths.y != 0;
 #ifdef LAMPS
@@ -268,25 +273,26 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             end = k + 1;
             vec3 through = exp(-m.sigma_t * dt);
             vec3 weight = transmittance * step_weight(m.sigma_t, through, dt);
-            p = ray.origin + ray.direction * t;
             scattered = weight * m.sigma_s;
 #ifndef DOM
             if (frame.sky_dims.w != 0 && frame.paths.x != 0) {
-                if (t >= sky_next) {
+                if (k >= sky_next) {
+                    p = middle_of(ray, t, sky_steps, dt, span.y);
                     sky = sky_scatter(p, -ray.direction, m.g);
-                    sky_next = t + sky_every;
+                    sky_next = k + sky_steps;
                 }
                 state.direct += scattered * sky;
             }
 #endif
             if (with_field) {
-                if (t >= field_next) {
+                if (k >= field_next) {
+                    p = middle_of(ray, t, field_steps, dt, span.y);
 #ifdef DOM
                     open = field_scattered_open(finest, p, field);
 #else
                     field = field_scatter(p, -ray.direction, m.g);
 #endif
-                    field_next = t + field_every;
+                    field_next = k + field_steps;
                 }
                 if (open)
                     state.indirect += scattered * field;

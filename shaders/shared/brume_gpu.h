@@ -66,7 +66,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_FIELD 19
 #define SLOT_LINKS 20
 #define SLOT_CELL_EXTINCT 21
-#define SLOT_CELL_ALBEDO 22
+#define SLOT_CELL_ALBEDO 22  /* with DOM what it lacks to 1 */
 #define SLOT_WALLS 23
 #define SLOT_FLOW 24         /* and two more: red, green, blue */
 #define SLOT_AREAS 24        /* and one more: fuzzy blockers' */

@@ -44,17 +44,18 @@ void add_point(inout vec3 q[MOMENTS], vec3 p, float part, uint lot)
     if (frame.counts.x > 0u) do {
         gpu_light light = light_at(number);
         gpu_light_sample s = light_sample_at(light.samples.x + turn_of(lot, light.samples.y));
-        vec3 towards;
-        float distance;
-        vec3 intensity = light_in_cube(light, s, p, part, towards, distance);
-        if (intensity == vec3(0.0))
-            continue;
-        vec3 depth = light_depth(light, p, towards, distance);
-        vec3 scattered = intensity * mean_transmittance(depth, extinct, towards, part) * sigma_s;
-        float y[MOMENTS];
-        harmonics(-towards, y);
-        for (int m = 0; m < MOMENTS; ++m)
-            q[m] += scattered * (bands[band_of(m)] * y[m]);
+        int paths = paths_into(light, p, part), i = 0;
+        do {
+            light_path path = path_into(light, s, i, paths, p, part, lot);
+            if (path.intensity == vec3(0.0))
+                continue;
+            vec3 depth = light_depth(light, path.p, path.towards, path.distance);
+            vec3 scattered = path.intensity * mean_transmittance(depth, extinct, path, part) * sigma_s;
+            float y[MOMENTS];
+            harmonics(-path.towards, y);
+            for (int m = 0; m < MOMENTS; ++m)
+                q[m] += scattered * (bands[band_of(m)] * y[m]);
+        } while (++i < paths);
     } while (++number < frame.counts.x);
 }
 

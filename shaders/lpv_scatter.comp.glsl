@@ -45,14 +45,16 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
     if (frame.counts.x > 0u) do {
         gpu_light light = light_at(number);
         gpu_light_sample s = light_sample_at(light.samples.x + turn_of(lot, light.samples.y));
-        vec3 towards;
-        float distance;
-        vec3 intensity = light_in_cube(light, s, p, part, towards, distance);
-        if (intensity == vec3(0.0))
-            continue;
-        vec3 power = intensity * light_transmittance(light, p, towards, distance) * sigma_s * volume;
-        for (int c = 0; c < 3; ++c)
-            flow[c] += power[c] * vec4(1.0, -g * towards);
+        int paths = paths_into(light, p, part), i = 0;
+        do {
+            light_path path = path_into(light, s, i, paths, p, part, lot);
+            if (path.intensity == vec3(0.0))
+                continue;
+            vec3 power = path.intensity * sigma_s * volume *
+                         light_transmittance(light, path.p, path.towards, path.distance);
+            for (int c = 0; c < 3; ++c)
+                flow[c] += power[c] * vec4(1.0, -g * path.towards);
+        } while (++i < paths);
     } while (++number < frame.counts.x);
 #ifdef SKY
     vec3 uvw = sky_coordinate(p);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The samples of a lamp with extent made one: -log of the mean of their transmittances.
+// The samples of a lamp with extent made one: the mean extinction with which, each from as far as it is, they
+// have the mean of their transmittances.
 #version 450 core
 #include "lib/depth.glsl"
 
@@ -21,18 +22,35 @@ void main()
     vec3 p = node_position(node);
     int count = stage.offset.y;
     vec3 depths[EXTENDED_SAMPLES];
-    vec3 least = vec3(1e30); // keeps the sum from underflow
+    float lengths[EXTENDED_SAMPLES];
+    float all_ = 0.0;
+    vec3 least = vec3(1e30); // keeps sums from underflow
     for (int i = 0; i < count; ++i) {
         gpu_depth_source s = sources[stage.offset.x + 1 + i];
         light_way way = way_to(s, p);
-        depths[i] = texelFetch(depth_before, node + s.tile.xyz, 0).rgb * (way.to - way.from);
+        lengths[i] = way.to - way.from;
+        all_ += lengths[i];
+        depths[i] = texelFetch(depth_before, node + s.tile.xyz, 0).rgb * lengths[i];
         least = min(least, depths[i]);
     }
     vec3 sum = vec3(0.0);
     for (int i = 0; i < count; ++i)
         sum += exp(least - depths[i]);
-    vec3 tau = least - log(sum / float(count));
     gpu_depth_source lamp = sources[stage.offset.x];
-    light_way way = way_to(lamp, p);
-    imageStore(depth_image, node + lamp.tile.xyz, depth_texel(tau, way.to - way.from, p));
+    vec3 mean = extinction_at(p);
+    if (all_ > 1e-4 * frame.lattice_lower.w) {
+        // exp(-mean length) has a greater mean over lengths than their mean has: Newton's method starts
+        // with too little, and never goes beyond.
+        mean = (least - log(sum / float(count))) * (float(count) / all_);
+        for (int step_ = 0; step_ < 4; ++step_) {
+            vec3 excess = -sum, slope = vec3(0.0);
+            for (int i = 0; i < count; ++i) {
+                vec3 through = exp(min(least - mean * lengths[i], vec3(80.0)));
+                excess += through;
+                slope += through * lengths[i];
+            }
+            mean += excess / max(slope, vec3(1e-30));
+        }
+    }
+    imageStore(depth_image, node + lamp.tile.xyz, vec4(min(mean, vec3(65504.0)), 1.0));
 }

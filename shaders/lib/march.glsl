@@ -54,17 +54,13 @@ float mean_inverse_square(float t0, float t1, float h)
 }
 
 // The distance from the ray that mean_inverse_square wants, and in `along` the point's place on the
-// ray. The light of a point or spot is that of a disk that faces whom it lights, as in Cycles:
-// 2 (1 - d / sqrt(d^2 + r^2)) / r^2 instead of 1/d^2, which is 1 / (d^2 + 0.7 r^2) within 5 % from
-// d = r / 2 on. Samples strewn over the lamp would each have a bright core of their own.
+// ray. Samples strewn over a disk that faces the medium would each have a bright core of their own.
 float nearest_approach(gpu_light light, gpu_light_sample s, view_ray ray, out float along)
 {
-    bool disk = light.info.x == uint(LIGHT_POINT) || light.info.x == uint(LIGHT_SPOT);
-    vec3 v = (disk ? light.position.xyz : s.position.xyz) - ray.origin;
+    vec3 v = (is_disk(light) ? light.position.xyz : s.position.xyz) - ray.origin;
     along = dot(v, ray.direction);
     vec3 off = v - along * ray.direction;
-    float soft = disk ? 0.7 * light.position.w * light.position.w : 0.0;
-    return sqrt(max(dot(off, off) + soft, 1e-8));
+    return sqrt(max(dot(off, off) + softness(light), 1e-8));
 }
 
 // The medium at one step of the ray: lattice and fog together.

@@ -86,19 +86,24 @@ float shadow_surface(int first, int last, vec3 p, float distance, vec3 normal, v
     return abs(lit);
 }
 
+// Unit vectors across a unit vector, the same as those of csrc/math/frame.cpp.
+void frame_around(vec3 forward, out vec3 u, out vec3 v)
+{
+    float s = forward.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + forward.z);
+    float b = forward.x * forward.y * a;
+    u = vec3(1.0 + s * forward.x * forward.x * a, s * b, -s * forward.x);
+    v = vec3(b, s + forward.y * forward.y * a, -forward.y);
+}
+
 // The view that sees along v (from the light), by the light's faces.
 int shadow_face(gpu_light light, vec3 v)
 {
     if (light.samples.z == 1u)
         return 0; // a spot's one map
-    vec3 forward = light.axis.xyz;
-    // Same frame as frame_around() of csrc/math/frame.cpp.
-    float s = forward.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + forward.z);
-    float b = forward.x * forward.y * a;
-    vec3 u = vec3(1.0 + s * forward.x * forward.x * a, s * b, -s * forward.x);
-    vec3 w = vec3(b, s + forward.y * forward.y * a, -forward.y);
-    vec3 q = vec3(dot(v, u), dot(v, w), dot(v, forward));
+    vec3 u, w;
+    frame_around(light.axis.xyz, u, w);
+    vec3 q = vec3(dot(v, u), dot(v, w), dot(v, light.axis.xyz));
     vec3 m = abs(q);
     if (m.z >= m.x && m.z >= m.y)
         return q.z > 0.0 ? 0 : 5;

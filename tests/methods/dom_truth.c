@@ -247,9 +247,41 @@ static double way_within(const double p[3], const double d[3], double way, doubl
     return fmax(to - from, 0.0);
 }
 
-/* 4 pi r^2 times the fluence that 1 W from a point in the cube [-half, half]^3 has at r from it,
- * all directions' mean, without what has not been scattered. Lengths are mean free paths. */
-static void shells(const double lamp[3], double half, int photons, double out[RADII][3])
+/* Of a lamp, 0 for a point: the radius of a disk that faces what it lights, or the side of a square
+ * that lights what is below it. */
+struct shape {
+    double radius, side;
+};
+
+/* What a disk sends to a place at a distance, as part of what a point does. Light from its rim
+ * comes from farther away. */
+static double seen_of_disk(double radius, double distance, uint64_t *state)
+{
+    const double lowest = distance / hypot(distance, radius);
+    if (1.0 - lowest < 1e-9)
+        return 1.0;
+    const double cosine = lowest + (1.0 - lowest) * lot(state);
+    const double per_point = 2.0 * (1.0 - lowest) * distance * distance / (radius * radius);
+    return per_point * exp(distance - distance / cosine);
+}
+
+/* A photon from anywhere on the square around a point, as often into any direction as is seen of it
+ * there. */
+static void leave_square(double side, double p[3], double d[3], uint64_t *state)
+{
+    for (int axis = 0; axis < 2; ++axis)
+        p[axis] += side * (lot(state) - 0.5);
+    const double square = lot(state), turn = 2.0 * PI * lot(state);
+    d[0] = sqrt(square) * cos(turn);
+    d[1] = sqrt(square) * sin(turn);
+    d[2] = -sqrt(1.0 - square);
+}
+
+/* 4 pi r^2 times the fluence that 1 W from a lamp in the cube [-half, half]^3 has at r from it,
+ * all directions' mean, without what has not been scattered. size: the lamp's radius; it is a disk
+ * that faces what it lights. Lengths are mean free paths. */
+static void shells(const double lamp[3], struct shape shape, double half, int photons,
+                   double out[RADII][3])
 {
     uint64_t state = 88172645463325252u;
     memset(out, 0, RADII * sizeof *out);
@@ -257,7 +289,10 @@ static void shells(const double lamp[3], double half, int photons, double out[RA
         double p[3] = {lamp[0], lamp[1], lamp[2]}, d[3] = {0, 0, 1}, weights[3] = {1, 1, 1};
         for (int hits = 0; weights[2] > 1e-3; ++hits) {
             double way = -log(lot(&state)), end;
-            scatter(d, 0.0, &state);
+            if (hits == 0 && shape.side > 0.0)
+                leave_square(shape.side, p, d, &state);
+            else
+                scatter(d, 0.0, &state);
             wall_ahead(p, d, half, &end);
             const double inside = fmin(way, end);
             const double from[3] = {p[0] - lamp[0], p[1] - lamp[1], p[2] - lamp[2]};
@@ -270,9 +305,10 @@ static void shells(const double lamp[3], double half, int photons, double out[RA
             }
             if (way >= end)
                 break;
+            const double seen = hits == 0 ? seen_of_disk(shape.radius, way, &state) : 1.0;
             for (int k = 0; k < 3; ++k) {
                 p[k] += way * d[k];
-                weights[k] *= point_albedos[k];
+                weights[k] *= point_albedos[k] * seen;
             }
         }
     }
@@ -304,7 +340,7 @@ static void dice_are_true(void **state)
         {1.516864, 1.870459}, {1.800558, 2.767047}, {1.866176, 4.271405}, {1.245388, 5.932533}};
     static const double lamp[3] = {0};
     double found[RADII][3];
-    shells(lamp, 1e9, 20000, found);
+    shells(lamp, (struct shape){0}, 1e9, 20000, found);
     for (int r = 0; r < RADII; ++r)
         for (int c = 0; c < 2; ++c)
             assert_close(found[r][c + 1] + exp(-radii[r]), infinite[r][c], 0.02);
@@ -330,7 +366,7 @@ static void points(void **state)
         const double from[3] = {half * (double)lamp[0], half * (double)lamp[1],
                                 half * (double)lamp[2]};
         double truth[RADII][3];
-        shells(from, half, 100000, truth);
+        shells(from, (struct shape){0}, half, 100000, truth);
         struct coefficients c = {.g = 0.0f};
         for (int k = 0; k < 3; ++k) {
             c.sigma_s[k] = (float)(half * point_albedos[k]);
@@ -351,6 +387,87 @@ static void points(void **state)
             }
         free(field.texels);
         brume_scene_destroy(scene);
+    }
+}
+
+/* --- A lamp near cells ---------------------------------------------------------------------- */
+
+/* What is scattered of 1 W from a lamp in a cube 3 mean free paths across, as shells() has it 1
+ * mean free path from it, of albedo 0.9. */
+static double scattered_around(const float lamp[3], struct shape shape, int cells)
+{
+    brume_settings settings = settings_for(cells);
+    settings.light_samples = 16;
+    const struct coefficients c = {.sigma_s = {1.35f, 1.35f, 1.35f},
+                                   .sigma_a = {0.15f, 0.15f, 0.15f}};
+    brume_scene *scene = empty();
+    add_fog_cube(scene, 1, origin, 1.0f, &c);
+    brume_light light = point_lamp(lamp, 1.0f);
+    light.radius = (float)(shape.radius / 1.5);
+    if (shape.side > 0.0) {
+        light.type = BRUME_LIGHT_RECTANGLE;
+        light.size[0] = light.size[1] = (float)(shape.side / 1.5);
+        light.power[0] = (float)(4.0 / PI); /* pi times its radiance is a quarter of it an area */
+    }
+    assert_ok(brume_scene_set_light(scene, 2, &light));
+    struct field field = field_of(scene, &settings, NULL);
+    const double found = shell_of(&field, lamp, 1.0 / 1.5, 0);
+    free(field.texels);
+    brume_scene_destroy(scene);
+    return found;
+}
+
+/* Nothing that is larger than a cell depends on where in its cell a lamp stands. */
+static void lamps_stand_anywhere(void **state)
+{
+    (void)state;
+    static const double places[][3] = {{0, 0, 0},       {0.5, 0.5, 0.5}, {0.5, 0, 0},
+                                       {0.5, 0.5, 0.0}, {0.02, 0.5, 0},  {0.31, 0.12, 0.43}};
+    enum { PLACES = sizeof places / sizeof *places };
+    for (int cells = 16; cells <= (at_length() ? 64 : 16); cells *= 2) {
+        double found[PLACES], mean = 0.0;
+        for (int i = 0; i < PLACES; ++i) {
+            float lamp[3];
+            for (int axis = 0; axis < 3; ++axis)
+                lamp[axis] = (float)(places[i][axis] * 2.0 / cells);
+            found[i] = scattered_around(lamp, (struct shape){0}, cells);
+            mean += found[i] / PLACES;
+        }
+        for (int i = 0; i < PLACES; ++i) {
+            print_message("%d cells, lamp at %g %g %g of one: %.4f, %+.2f %%\n", cells,
+                          places[i][0], places[i][1], places[i][2], found[i],
+                          100.0 * (found[i] / mean - 1.0));
+            assert_close(found[i], mean, 0.01 * mean);
+        }
+    }
+}
+
+/* The medium next to a disk that turns towards it has less of its light than of a point's; a square
+ * has all of its own, be it less than a cell or many. */
+static void large_lamps(void **state)
+{
+    (void)state;
+    static const struct shape shapes[] = {{0},
+                                          {.radius = 0.03},
+                                          {.radius = 0.075},
+                                          {.radius = 0.15},
+                                          {.radius = 0.3},
+                                          {.side = 0.06},
+                                          {.side = 0.15},
+                                          {.side = 0.3},
+                                          {.side = 0.6}};
+    static const double middle[3] = {0};
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; ++i) {
+        double truth[RADII][3];
+        shells(middle, shapes[i], 1.5, 200000, truth);
+        for (int cells = 16; cells <= (at_length() ? 64 : 16); cells *= 2) {
+            const double found = scattered_around(origin, shapes[i], cells);
+            print_message(
+                "%d cells, lamp of radius %g or side %g: %.4f scattered, %.4f is right, %+.2f %%\n",
+                cells, shapes[i].radius, shapes[i].side, found, truth[1][1],
+                100.0 * (found / truth[1][1] - 1.0));
+            assert_close(found, truth[1][1], 0.015);
+        }
     }
 }
 
@@ -505,10 +622,9 @@ static void deep(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(spheres),
-        cmocka_unit_test(dice_are_true),
-        cmocka_unit_test(points),
-        cmocka_unit_test(deep),
+        cmocka_unit_test(spheres),     cmocka_unit_test(dice_are_true),
+        cmocka_unit_test(points),      cmocka_unit_test(lamps_stand_anywhere),
+        cmocka_unit_test(large_lamps), cmocka_unit_test(deep),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

@@ -132,7 +132,7 @@ vec3 field_surface(surface s, vec3 p)
     vec3 q = field_leaves(p + before, left) - before;
     if (left <= 0.0)
         return vec3(0.0);
-    field_light light = field_at(q, s.normal, frame.field.x - 1);
+    field_light light = field_at(q, s.normal, s.view, frame.field.x - 1);
     return left * (s.diffuse * field_irradiance(light, s.normal) / PI +
                    s.specular * field_radiance(light, reflect(-s.view, s.normal)));
 }

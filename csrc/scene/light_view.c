@@ -58,9 +58,8 @@ static void perspective_view(const float eye[3], const float direction[3], const
 {
     float view[16];
     mat4_look(eye, direction, up, view);
-    /* Room at the rim for the look-up of a surface, which steps off it by a texel at its distance:
-     * at a cube's corner up to sqrt(6) texels across the map. */
-    tangent *= 1.0f + 6.0f / (float)side;
+    /* A texel of room for the filter at the rim. */
+    tangent *= 1.0f + 2.0f / (float)side;
     /* Reversed depth without a far plane: near / distance. */
     const float projection[16] = {
         1.0f / tangent, 0, 0, 0, 0, 1.0f / tangent, 0, 0, 0, 0, 0, -1, 0, 0, near_, 0};

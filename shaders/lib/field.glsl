@@ -97,9 +97,8 @@ float share_of_cell(cells_between cells, gpu_field field, int corner, vec4 plane
 }
 
 // Interpolated between the eight cells around a point.
-field_light field_between(gpu_field field, vec3 p, vec4 plane)
+field_light field_between(gpu_field field, cells_between cells, vec4 plane)
 {
-    cells_between cells = cells_around(field, p);
     field_light light = field_light(vec3(0.0), mat3(0.0));
     float sum = 0.0;
     int corners = 8 * min(frame.field.x, 1); // not unrolled, which would take seconds to compile
@@ -157,8 +156,21 @@ float share_of(gpu_field field, vec3 p)
     return clamp(min(inside.x, min(inside.y, inside.z)) / (float(FIELD_GIVES_WAY) * field.lower.w), 0.0, 1.0);
 }
 
-// The light at a point of no surface (normal: 0), or as it is before one, of lattices up to that number.
-field_light field_at(vec3 p, vec3 normal, int finest)
+// The cells that tell the light before a surface: those half a cell off it. If something else stands there, such
+// as the floor under a vase's belly, they know nothing of what is between; but nothing stands between the surface
+// and the eye.
+cells_between cells_before(gpu_field field, vec3 p, vec3 normal, vec3 view)
+{
+    float reach = 0.5 * field.lower.w;
+    cells_between before = cells_around(field, p + normal * (reach * dot(abs(normal), vec3(1.0))));
+    cells_between seen = cells_around(field, p + view * reach);
+    ivec3 off = before.home - seen.home;
+    return any(notEqual(off, ivec3(0))) && is_cut(seen.cuts, clamp(off, -1, 1)) ? seen : before;
+}
+
+// The light at a point of no surface (normal: 0), or as it is before one that is seen from a direction, of
+// lattices up to that number.
+field_light field_at(vec3 p, vec3 normal, vec3 view, int finest)
 {
     field_light light = field_light(vec3(0.0), mat3(0.0));
     bool surface = normal != vec3(0.0);
@@ -170,8 +182,8 @@ field_light field_at(vec3 p, vec3 normal, int finest)
         float share = number > 0 ? left * share_of(field, p) : left;
         if (share <= 0.0)
             continue;
-        float reach = 0.5 * field.lower.w * (abs(normal.x) + abs(normal.y) + abs(normal.z));
-        field_light here = field_between(field, p + normal * reach, plane);
+        cells_between cells = surface ? cells_before(field, p, normal, view) : cells_around(field, p);
+        field_light here = field_between(field, cells, plane);
         light.fluence += share * here.fluence;
         light.flux += share * here.flux;
         left -= share;
@@ -185,7 +197,7 @@ vec3 field_scatter(vec3 p, vec3 out_direction, float g)
 {
     if (!field_reaches(p))
         return vec3(0.0);
-    field_light light = field_at(p, vec3(0.0), frame.field.x - 1);
+    field_light light = field_at(p, vec3(0.0), vec3(0.0), frame.field.x - 1);
     return max(light.fluence + 3.0 * g * (out_direction * light.flux), vec3(0.0)) / (4.0 * PI);
 }
 

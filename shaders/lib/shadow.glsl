@@ -24,66 +24,75 @@ float shadow_distance(gpu_shadow_view view, float depth)
 
 const float SHADOW_OUTSIDE = -1.0;
 
-// The share of a light sample that geometry lets through to p: one texel (soft false) or a
-// bilinear comparison of four. SHADOW_OUTSIDE where the map does not reach.
-float shadow_test(gpu_shadow_view view, vec3 p, float bias, bool soft)
+// Where in a map p is: x, y: 0..1; z: distance from the light, as the map has it. SHADOW_OUTSIDE in z where it does
+// not reach.
+vec3 shadow_place(gpu_shadow_view view, vec3 p)
 {
     vec4 clip = view.clip_from_world * vec4(p, 1.0);
-    if (clip.w <= 0.0)
-        return SHADOW_OUTSIDE;
     vec2 uv = clip.xy / clip.w * 0.5 + 0.5;
-    if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0))))
-        return SHADOW_OUTSIDE;
-    float distance_here = view.range.x != 0.0
-                              ? view.range.z - clip.z * (view.range.z - view.range.y)
-                              : clip.w;
-    distance_here -= bias;
+    if (clip.w <= 0.0 || any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0))))
+        return vec3(uv, SHADOW_OUTSIDE);
+    return vec3(uv, view.range.x != 0.0 ? view.range.z - clip.z * (view.range.z - view.range.y) : clip.w);
+}
+
+// Texels of the layer, from a place in a map.
+vec2 shadow_texel(gpu_shadow_view view, vec2 uv, float rim)
+{
     float side = float(frame.counts.y);
-    vec2 texel = (view.tile.xy + uv * view.tile.z) * side;
-    // Whole texels of this map, and none of the one beside it in the layer.
-    vec2 low = view.tile.xy * side, high = low + view.tile.z * side;
-    if (!soft) {
-        texel = clamp(texel, low + 0.5, high - 0.5);
-        float depth = texelFetch(shadow_maps, ivec3(texel, int(view.tile.w)), 0).r;
-        return shadow_distance(view, depth) < distance_here ? 0.0 : 1.0;
-    }
-    texel = clamp(texel, low + 1.0, high - 1.0);
-    vec4 depths = textureGather(shadow_maps, vec3(texel / side, view.tile.w));
-    vec4 lit;
-    for (int i = 0; i < 4; ++i)
-        lit[i] = shadow_distance(view, depths[i]) < distance_here ? 0.0 : 1.0;
-    vec2 f = fract(texel - 0.5);
-    return mix(mix(lit.w, lit.z, f.x), mix(lit.x, lit.y, f.x), f.y);
+    vec2 low = view.tile.xy * side; // whole texels of this map, and none of the one beside it in the layer
+    return clamp((view.tile.xy + uv * view.tile.z) * side, low + rim, low + view.tile.z * side - rim);
 }
 
 // The maps are from first to last: where one does not reach, the next is asked. In loops, so that software
 // does not ask all. Beyond all of them all is lit.
 
-// A point of a medium has no normal to step off along: near a surface it stays clear of the depths
-// that a texel of the map rounds.
+// A point of a medium has no normal to tell how surfaces lie: near one it stays clear of the depths that a
+// texel of the map rounds.
 float shadow_medium(int first, int last, vec3 p, float distance)
 {
-    float lit;
     do {
         gpu_shadow_view view = shadow_view(first);
-        lit = shadow_test(view, p, 1.5 * view.range.w * distance, false);
-    } while (lit == SHADOW_OUTSIDE && ++first <= last);
-    return abs(lit);
+        vec3 place = shadow_place(view, p);
+        if (place.z == SHADOW_OUTSIDE)
+            continue;
+        ivec2 texel = ivec2(shadow_texel(view, place.xy, 0.5));
+        float depth = texelFetch(shadow_maps, ivec3(texel, int(view.tile.w)), 0).r;
+        return shadow_distance(view, depth) < place.z - 1.5 * view.range.w * distance ? 0.0 : 1.0;
+    } while (++first <= last);
+    return 1.0;
 }
 
-// A surface moves the look-up off itself along its normal by the texel's size. The slope's share of
-// the bias is bounded: at grazing light the offset along the normal does the rest.
+// Of a surface the four texels around p are asked, each for where the surface's plane is in it, as far as that
+// is nearer to the light: one that comes nearer does not shadow itself, and where it goes away another one
+// that meets it may be lit as well. p itself stays where it is: stepping off the surface, by a texel along its
+// normal, moves the rims of shadows by more than that in flat light. The slope is bounded at grazing light.
 float shadow_surface(int first, int last, vec3 p, float distance, vec3 normal, vec3 towards)
 {
     float cosine = clamp(dot(normal, towards), 0.05, 1.0);
     float slope = min(sqrt(1.0 - cosine * cosine) / cosine, 4.0);
-    float lit;
     do {
         gpu_shadow_view view = shadow_view(first);
-        float texel = view.range.w * distance;
-        lit = shadow_test(view, p + normal * texel, texel * (0.5 + 0.5 * slope), true);
-    } while (lit == SHADOW_OUTSIDE && ++first <= last);
-    return abs(lit);
+        vec3 place = shadow_place(view, p);
+        if (place.z == SHADOW_OUTSIDE)
+            continue;
+        vec2 texel = shadow_texel(view, place.xy, 1.0);
+        vec4 depths = textureGather(shadow_maps, vec3(texel / float(frame.counts.y), view.tile.w));
+        vec2 f = fract(texel - 0.5);
+        // How the plane's distance grows from texel to texel.
+        mat4 m = view.clip_from_world;
+        vec3 across = vec3(m[0].x, m[1].x, m[2].x), up = vec3(m[0].y, m[1].y, m[2].y);
+        float metres = view.range.w * distance; // a texel's size
+        vec2 grows = vec2(dot(normal, across) * inversesqrt(dot(across, across)),
+                          dot(normal, up) * inversesqrt(dot(up, up))) * (metres / cosine);
+        vec4 plane = vec4(-f.x, 1.0 - f.x, 1.0 - f.x, -f.x) * grows.x +
+                     vec4(1.0 - f.y, 1.0 - f.y, -f.y, -f.y) * grows.y;
+        vec4 here = place.z + min(plane, 0.0) - metres * (0.5 + 0.5 * slope);
+        vec4 lit;
+        for (int i = 0; i < 4; ++i)
+            lit[i] = shadow_distance(view, depths[i]) < here[i] ? 0.0 : 1.0;
+        return mix(mix(lit.w, lit.z, f.x), mix(lit.x, lit.y, f.x), f.y);
+    } while (++first <= last);
+    return 1.0;
 }
 
 // Unit vectors across a unit vector, the same as those of csrc/math/frame.cpp.

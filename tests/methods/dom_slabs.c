@@ -76,8 +76,10 @@ struct cut {
 
 /* Between white walls on four sides, which lose nothing, a piece is as a slab without end, as long
  * as it is not thick: matt walls turn back light that went on downwards, and iterations go on for
- * long. One three times as wide as deep needs none: what leaves by its sides its middle hardly
- * misses. */
+ * long. One six times as wide as deep needs none: what leaves by its sides its middle does not
+ * miss. In the lattice walls reach half a cell beyond their rims, and keep there what leaves a
+ * slab: so much that the middle of a piece twice as wide as deep is 1 % brighter than by Monte
+ * Carlo. */
 static bool wants_walls(double tau)
 {
     return tau <= 8.0;
@@ -172,13 +174,12 @@ static const struct slab *slab_of(double g, double tau)
     return NULL;
 }
 
-/* Thin ones wider, or looks that go flat through them end at the walls; thick ones finer: a cell of
- * a mean free path misses 3 % of what a surface reflects of diffuse light. */
+/* Thin ones wider, or looks that go flat through them end at the walls. */
 static struct cut usual_cut(double tau)
 {
     return tau <= 1.0         ? (struct cut){8.0, 8, 48}
            : wants_walls(tau) ? (struct cut){3.0, 16, 48}
-                              : (struct cut){3.0, 32, 48};
+                              : (struct cut){6.0, 16, 48};
 }
 
 static void some_slabs(void **state)
@@ -191,7 +192,7 @@ static void some_slabs(void **state)
     static const int which[3] = {1, 2, 3};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
         const struct cut cut = usual_cut(rows[i].tau);
-        assert_true(off(slab_of(rows[i].g, rows[i].tau), &cut, which, rows[i].light) < 0.02);
+        assert_true(off(slab_of(rows[i].g, rows[i].tau), &cut, which, rows[i].light) < 0.015);
     }
 }
 
@@ -207,8 +208,8 @@ static void all_slabs(void **state)
             most[light] = fmax(most[light], off(&slabs[i], &cut, last, (enum light)light));
         }
     print_message("beam %.4f diffuse %.4f at most\n", most[BEAM], most[DIFFUSE]);
-    assert_true(most[BEAM] < 0.02);
-    assert_true(most[DIFFUSE] < 0.02);
+    assert_true(most[BEAM] < 0.015);
+    assert_true(most[DIFFUSE] < 0.015);
 }
 
 static void finer_slabs(void **state)
@@ -217,7 +218,7 @@ static void finer_slabs(void **state)
     static const int which[3] = {1, 2, 3};
     static const double rows[][2] = {{0.0, 4.0}, {0.75, 4.0}, {0.75, 8.0}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
-        const struct cut cut = {2.0, 32, 96};
+        const struct cut cut = {3.0, 32, 96};
         assert_true(off(slab_of(rows[i][0], rows[i][1]), &cut, which, BEAM) < 0.01);
     }
 }

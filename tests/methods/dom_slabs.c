@@ -174,12 +174,13 @@ static const struct slab *slab_of(double g, double tau)
     return NULL;
 }
 
-/* Thin ones wider, or looks that go flat through them end at the walls. */
+/* Thin ones wider, or looks that go flat through them end at the walls; and others as wide that it
+ * hardly counts that walls are matt: in the middle of a piece three times as wide as deep, of depth
+ * 4, g 0.75 and without absorption, they make R and T 1.4 and 1 % more than those of a slab without
+ * end (Monte Carlo). */
 static struct cut usual_cut(double tau)
 {
-    return tau <= 1.0         ? (struct cut){8.0, 8, 48}
-           : wants_walls(tau) ? (struct cut){3.0, 16, 48}
-                              : (struct cut){6.0, 16, 48};
+    return tau <= 1.0 ? (struct cut){8.0, 8, 48} : (struct cut){6.0, 16, 48};
 }
 
 static void some_slabs(void **state)
@@ -218,7 +219,7 @@ static void finer_slabs(void **state)
     static const int which[3] = {1, 2, 3};
     static const double rows[][2] = {{0.0, 4.0}, {0.75, 4.0}, {0.75, 8.0}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
-        const struct cut cut = {3.0, 32, 96};
+        const struct cut cut = {4.0, 24, 96};
         assert_true(off(slab_of(rows[i][0], rows[i][1]), &cut, which, BEAM) < 0.01);
     }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The field as surfaces want it, in lpv_finish's form: fluence and flux of light that was scattered or
-// reflected. And all moments of the light that media scatter towards the eye without the lamps: that
+// reflected, and band 2 of that. And all moments of the light that media scatter towards the eye without the lamps: that
 // light and the world's own. And what surfaces send out, for the next run.
 #version 450 core
 #include "lib/ordinates.glsl"
@@ -22,6 +22,7 @@ layout(binding = SLOT_CELL_WALLS) uniform sampler3D cell_walls;
 layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D field_image;
 layout(binding = SLOT_OUTPUT + 1, rgba16f) writeonly uniform image3D light_image;
 layout(binding = SLOT_OUTPUT + 2, rgba16f) writeonly uniform image3D wall_image;
+layout(binding = SLOT_OUTPUT + 3, rgba16f) writeonly uniform image3D band_image;
 
 void main()
 {
@@ -45,6 +46,8 @@ void main()
                  << (8 * axis);
     const float fluence = 3.5449077018110318, flux = 2.0466534158929770; // sqrt(4 pi), sqrt(4 pi / 3)
     ivec3 texel = above(cell);
+    for (int m = 0; m < BAND_2; ++m)
+        imageStore(band_image, texel + ivec3(m * level.dims.x, 0, 0), fit(own[4 + m], 0.0));
     for (int c = 0; c < 3; ++c, texel.x += level.dims.x)
         imageStore(field_image, texel,
                    vec4(fluence * own[0][c], flux * own[3][c], flux * own[1][c], flux * own[2][c]));

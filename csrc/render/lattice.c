@@ -381,6 +381,7 @@ static void layout_within(struct renderer *renderer, const struct render_request
     const brume_settings *settings = &request->settings;
     const int asked = settings->cascades;
     frame->field.x = 1;
+    frame->field.y = settings->method == BRUME_METHOD_DOM;
     if (!asked) {
         const struct medium_textures *medium = &renderer->medium;
         if (settings->method == BRUME_METHOD_DOM && medium->dims[0] &&

@@ -571,6 +571,7 @@ static brume_result hand_over(struct dom_work *work, struct transport *transport
     image(SLOT_OUTPUT, &transport->field);
     image(SLOT_OUTPUT + 1, &transport->light);
     image(SLOT_OUTPUT + 2, &transport->wall);
+    image(SLOT_OUTPUT + 3, &transport->band_2);
     return over_field(work, "dom_finish", (ivec4){has_world(work), 0, 0, 0});
 }
 
@@ -595,6 +596,8 @@ static brume_result make_product(struct transport *transport, const struct trans
                        "scattered towards the eye"));
     TRY(texture_ensure(memory, &transport->wall, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
                        texture_side(x), texture_side(y), texture_side(z), 1, "surfaces' radiance"));
+    TRY(texture_ensure(memory, &transport->band_2, FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
+                       texture_side(BAND_2 * x), texture_side(y), texture_side(z), 1, "band 2"));
     for (int i = 0; i < frame->field.x; ++i)
         TRY(buffer_update(memory, &transport->levels[i], FOR_TRANSPORT, sizeof frame->fields[i],
                           &frame->fields[i], "lattice"));

@@ -24,12 +24,13 @@ void transport_bind(const struct transport *transport)
     glBindTextureUnit(SLOT_SKY_B, transport->sky[2].id);
     glBindTextureUnit(SLOT_FIELD, transport->field.id);
     glBindTextureUnit(SLOT_SCATTERED, transport->scattered.id);
+    glBindTextureUnit(SLOT_BAND_2, transport->band_2.id);
 }
 
 uint64_t transport_field_bytes(const struct transport *transport)
 {
     uint64_t bytes = transport->field.bytes + transport->light.bytes + transport->means.bytes +
-                     transport->scattered.bytes + transport->wall.bytes;
+                     transport->scattered.bytes + transport->wall.bytes + transport->band_2.bytes;
     for (int i = 0; i < FIELD_LEVELS; ++i)
         bytes += transport->levels[i].bytes;
     return bytes;
@@ -41,6 +42,7 @@ void transport_forget_moments(struct gpu *gpu, struct transport *transport)
     texture_finish(&gpu->memory, &transport->means);
     texture_finish(&gpu->memory, &transport->scattered);
     texture_finish(&gpu->memory, &transport->wall);
+    texture_finish(&gpu->memory, &transport->band_2);
     for (int i = 0; i < FIELD_LEVELS; ++i)
         buffer_finish(&gpu->memory, &transport->levels[i]);
     transport->level_count = 0;

@@ -4,12 +4,16 @@
 
 layout(binding = SLOT_FIELD) uniform sampler3D field_lattice; // as lpv_finish leaves it
 layout(binding = SLOT_SCATTERED) uniform sampler3D scattered_lattice; // DOM's
+layout(binding = SLOT_BAND_2) uniform sampler3D band_2; // DOM's: moments of the same light
 
 struct field_light
 {
     vec3 fluence; // W/m^2
     mat3 flux;    // columns: colours; where the light goes
+    vec3 second[BAND_2]; // moments of band 2, 0 where they are not asked for
 };
+
+const field_light DARK = field_light(vec3(0.0), mat3(0.0), vec3[](vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)));
 
 bool field_exists()
 {
@@ -43,13 +47,24 @@ ivec3 home_of(gpu_field field, ivec3 low, vec3 f, ivec3 last)
     return clamp(home, ivec3(0), last);
 }
 
-void add_cell(inout field_light light, gpu_field field, ivec3 cell, float weight)
+void add_cell(inout field_light light, gpu_field field, ivec3 cell, float weight, bool second)
 {
     for (int c = 0; c < 3; ++c) {
         vec4 texel = texelFetch(field_lattice, texel_of(field, cell, c), 0);
         light.fluence[c] += weight * texel.x;
         light.flux[c] += weight * texel.yzw;
     }
+    if (second)
+        for (int m = 0; m < BAND_2; ++m)
+            light.second[m] += weight * texelFetch(band_2, texel_of(field, cell, m), 0).rgb;
+}
+
+void add_light(inout field_light light, field_light other, float share)
+{
+    light.fluence += share * other.fluence;
+    light.flux += share * other.flux;
+    for (int m = 0; m < BAND_2; ++m)
+        light.second[m] += share * other.second[m];
 }
 
 // The links of a cell that surfaces cut.
@@ -97,9 +112,9 @@ float share_of_cell(cells_between cells, gpu_field field, int corner, vec4 plane
 }
 
 // Interpolated between the eight cells around a point.
-field_light field_between(gpu_field field, cells_between cells, vec4 plane)
+field_light field_between(gpu_field field, cells_between cells, vec4 plane, bool second)
 {
-    field_light light = field_light(vec3(0.0), mat3(0.0));
+    field_light light = DARK, whole = DARK;
     float sum = 0.0;
     int corners = 8 * min(frame.field.x, 1); // not unrolled, which would take seconds to compile
     int corner = 0;
@@ -109,16 +124,14 @@ field_light field_between(gpu_field field, cells_between cells, vec4 plane)
         if (weight <= 0.0)
             continue;
         sum += weight;
-        add_cell(light, field, cell, weight);
+        add_cell(light, field, cell, weight, second);
     } while (++corner < corners);
     if (sum > 1e-3) {
-        light.fluence /= sum;
-        light.flux /= sum;
-        return light;
+        add_light(whole, light, 1.0 / sum);
+        return whole;
     }
-    light = field_light(vec3(0.0), mat3(0.0));
-    add_cell(light, field, cells.home, 1.0);
-    return light;
+    add_cell(whole, field, cells.home, 1.0, second);
+    return whole;
 }
 
 // The field ends where its largest lattice does.
@@ -172,8 +185,8 @@ cells_between cells_before(gpu_field field, vec3 p, vec3 normal, vec3 view)
 // lattices up to that number.
 field_light field_at(vec3 p, vec3 normal, vec3 view, int finest)
 {
-    field_light light = field_light(vec3(0.0), mat3(0.0));
-    bool surface = normal != vec3(0.0);
+    field_light light = DARK;
+    bool surface = normal != vec3(0.0), second = surface && frame.field.y != 0;
     vec4 plane = vec4(normal, surface ? dot(normal, p) : -1.0);
     float left = 1.0;
     int number = max(finest, 0);
@@ -183,9 +196,7 @@ field_light field_at(vec3 p, vec3 normal, vec3 view, int finest)
         if (share <= 0.0)
             continue;
         cells_between cells = surface ? cells_before(field, p, normal, view) : cells_around(field, p);
-        field_light here = field_between(field, cells, plane);
-        light.fluence += share * here.fluence;
-        light.flux += share * here.flux;
+        add_light(light, field_between(field, cells, plane, second), share);
         left -= share;
     } while (--number >= 0 && left > 0.0);
     return light;
@@ -264,13 +275,25 @@ bool field_scattered_open(gpu_field finest, vec3 p, out vec3 light)
     return there.w <= 0.0;
 }
 
+// Band 2 of the radiance from, or to, a direction.
+vec3 second_along(field_light light, vec3 d)
+{
+    return 1.0925484305920792 * (d.x * d.y * light.second[0] + d.y * d.z * light.second[1] + d.x * d.z * light.second[3]) +
+           0.31539156525252005 * (3.0 * d.z * d.z - 1.0) * light.second[2] +
+           0.5462742152960396 * (d.x * d.x - d.y * d.y) * light.second[4];
+}
+
+// Ramamoorthi and Hanrahan, "An Efficient Representation for Irradiance Environment Maps", SIGGRAPH 2001, eq. 13;
+// of band 3 there is nothing in it.
 vec3 field_irradiance(field_light light, vec3 normal)
 {
-    return max(0.25 * light.fluence - 0.5 * (normal * light.flux), vec3(0.0));
+    return max(0.25 * light.fluence - 0.5 * (normal * light.flux) + 0.25 * PI * second_along(light, normal),
+               vec3(0.0));
 }
 
 // Radiance that arrives from a direction.
 vec3 field_radiance(field_light light, vec3 towards)
 {
-    return max(light.fluence - 3.0 * (towards * light.flux), vec3(0.0)) / (4.0 * PI);
+    return max((light.fluence - 3.0 * (towards * light.flux)) / (4.0 * PI) + second_along(light, towards),
+               vec3(0.0));
 }

@@ -82,6 +82,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_LIGHTS 36
 #define SLOT_LIGHT_SAMPLES 37
 #define SLOT_SHADOW_VIEWS 38
+#define SLOT_BAND_2 39       /* with DOM: what the field has of it */
 /* DOM's, while it looks for the field */
 #define SLOT_ANGULAR 24      /* by ordinates: the source; in the end what cells' means are, */
 #define SLOT_HITS 25         /* and what meets surfaces */
@@ -150,6 +151,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define MOST_ORDINATES 96
 #define MOMENT_SIDE 4
 #define MOMENTS 16
+#define BAND_2 5 /* of these, from number 4 on */
 #define MIXED 5
 #define HISTORY 4
 /* Below this optical depth of a cell light does not diffuse. */
@@ -311,7 +313,7 @@ struct gpu_frame {
     vec4 lattice_lower;  /* transport lattice; w: cell, m */
     ivec4 lattice_dims;  /* nodes along the sides; w: 1 if there is one */
     gpu_field fields[FIELD_LEVELS];
-    ivec4 field;         /* x: how many of these there are */
+    ivec4 field;         /* x: how many of these there are; y: 1 if band 2 of their light is known */
     vec4 sky_lower;      /* lattice of the world's light; w: cell, m */
     ivec4 sky_dims;      /* nodes along the sides; w: 1 if there is one */
     vec4 fog_lower;      /* the world's medium; w: 1 if there is one */

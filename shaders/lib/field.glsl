@@ -169,6 +169,11 @@ float share_of(gpu_field field, vec3 p)
     return clamp(min(inside.x, min(inside.y, inside.z)) / (float(FIELD_GIVES_WAY) * field.lower.w), 0.0, 1.0);
 }
 
+float home_green(gpu_field field, cells_between cells)
+{
+    return texelFetch(field_lattice, texel_of(field, cells.home, 1), 0).x;
+}
+
 // The cells that tell the light before a surface: those half a cell off it. If something else stands there, such
 // as the floor under a vase's belly, they know nothing of what is between; but nothing stands between the surface
 // and the eye.
@@ -178,7 +183,9 @@ cells_between cells_before(gpu_field field, vec3 p, vec3 normal, vec3 view)
     cells_between before = cells_around(field, p + normal * (reach * dot(abs(normal), vec3(1.0))));
     cells_between seen = cells_around(field, p + view * reach);
     ivec3 off = before.home - seen.home;
-    return any(notEqual(off, ivec3(0))) && is_cut(seen.cuts, clamp(off, -1, 1)) ? seen : before;
+    bool parted = any(notEqual(off, ivec3(0))) && is_cut(seen.cuts, clamp(off, -1, 1));
+    // Within what is solid it is dark; a cell on the way to the eye may be, too, if it is larger than that.
+    return parted && home_green(field, seen) > home_green(field, before) ? seen : before;
 }
 
 // The light at a point of no surface (normal: 0), or as it is before one that is seen from a direction, of

@@ -67,8 +67,8 @@ light_path ray_from(gpu_light light, int number, vec3 p, float side)
     return path;
 }
 
-// Of an area lamp, as a rectangle of its area: the point of it in that part (0..1) of its solid angle from p, and
-// the solid angle. Urena, Fajardo and King, "An Area-Preserving Parametrization for Spherical Rectangles",
+// Of an area lamp that p is before, as a rectangle of its area: the point of it in that part (0..1) of its solid
+// angle from p, and the solid angle. Urena, Fajardo and King, "An Area-Preserving Parametrization for Spherical Rectangles",
 // EGSR 2013.
 vec3 seen_point(gpu_light light, vec3 p, vec2 part, out float solid_angle)
 {
@@ -76,8 +76,7 @@ vec3 seen_point(gpu_light light, vec3 p, vec2 part, out float solid_angle)
     vec2 extent = vec2(length(light.tangent.xyz), length(light.bitangent.xyz));
     vec3 x = light.tangent.xyz / extent.x, y = light.bitangent.xyz / extent.y, v = light.position.xyz - p;
     vec2 middle = vec2(dot(v, x), dot(v, y)), low = middle - fits * extent, high = middle + fits * extent;
-    vec3 z = dot(v, light.axis.xyz) < 0.0 ? light.axis.xyz : -light.axis.xyz; // towards p, or behind it
-    float off = -max(-dot(v, z), 1e-4 * min(extent.x, extent.y));
+    float off = dot(v, light.axis.xyz);
     // Cosines of the planes that its sides lie in, and the corners that these make.
     vec4 sides = vec4(-low.y, high.x, high.y, -low.x);
     vec4 planes = sides * inversesqrt(sides * sides + off * off);
@@ -93,7 +92,7 @@ vec3 seen_point(gpu_light light, vec3 p, vec2 part, out float solid_angle)
     float h = mix(low.y * inversesqrt(d * d + low.y * low.y), high.y * inversesqrt(d * d + high.y * high.y),
                   part.y);
     float along_y = clamp(h * d * inversesqrt(max(1.0 - h * h, 1e-12)), low.y, high.y);
-    return p + along_x * x + along_y * y + off * z;
+    return p + along_x * x + along_y * y + off * light.axis.xyz;
 }
 
 // One of the paths of a sample's light into a cube of that side around p; lot: any number.
@@ -104,7 +103,8 @@ light_path path_into(gpu_light light, gpu_light_sample s, int number, int paths,
     float square;
     if (paths > 1) {
         path = ray_from(light, number, p, side);
-    } else if (is_wide(light, side) && dot(off, off) < 4.0 * light.radiance.w) {
+    } else if (is_wide(light, side) && dot(off, off) < 4.0 * light.radiance.w &&
+               dot(off, light.axis.xyz) < -1e-3 * sqrt(light.radiance.w)) { // well before it
         vec2 part = vec2(hash(lot) >> 8, hash(lot + 1u) >> 8) / 16777216.0;
         float solid_angle;
         vec3 point = seen_point(light, p, part, solid_angle);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The field as surfaces want it, in lpv_finish's form: fluence and flux of light that was scattered or
-// reflected, and band 2 of that. And all moments of the light that media scatter towards the eye without the lamps: that
-// light and the world's own. And what surfaces send out, for the next run.
+// reflected, and band 2 of that. And all moments of the light that media scatter towards the eye without
+// the lamps: that light and the world's own. And what surfaces send out, for the next run.
 #version 450 core
 #include "lib/ordinates.glsl"
 

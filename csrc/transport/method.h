@@ -18,9 +18,8 @@ struct transport {
     struct texture sky[3]; /* the world's light, spherical harmonics a colour */
     struct texture field;  /* light scattered or reflected before, as lpv_finish leaves it */
     /* DOM: moments of the light that media scatter, what cells scatter of it to the eye, in the mean
-     * and as it is interpolated, what surfaces in cells send out, and
-     * what light surfaces are to know of band 2; of so many lattices, one above
-     * the other. */
+     * and as it is interpolated, what surfaces in cells send out, and band 2 of the field; of so many
+     * lattices, one above the other. */
     struct texture light, means, scattered, wall, band_2;
     struct buffer levels[FIELD_LEVELS];
     int level_count;

@@ -68,8 +68,8 @@ light_path ray_from(gpu_light light, int number, vec3 p, float side)
 }
 
 // Of an area lamp that p is before, as a rectangle of its area: the point of it in that part (0..1) of its solid
-// angle from p, and the solid angle. Urena, Fajardo and King, "An Area-Preserving Parametrization for Spherical Rectangles",
-// EGSR 2013.
+// angle from p, and the solid angle. Urena, Fajardo and King, "An Area-Preserving Parametrization for Spherical
+// Rectangles", EGSR 2013.
 vec3 seen_point(gpu_light light, vec3 p, vec2 part, out float solid_angle)
 {
     float fits = light.info.x == uint(LIGHT_RECTANGLE) ? 1.0 : 0.5 * sqrt(PI);
@@ -105,7 +105,7 @@ light_path path_into(gpu_light light, gpu_light_sample s, int number, int paths,
         path = ray_from(light, number, p, side);
     } else if (is_wide(light, side) && dot(off, off) < 4.0 * light.radiance.w &&
                dot(off, light.axis.xyz) < -1e-3 * sqrt(light.radiance.w)) { // well before it
-        vec2 part = vec2(hash(lot) >> 8, hash(lot + 1u) >> 8) / 16777216.0;
+        vec2 part = vec2(hash(lot), hash(lot + 1u)) / 4294967296.0;
         float solid_angle;
         vec3 point = seen_point(light, p, part, solid_angle);
         path.intensity = light_intensity(light, point, p, path.towards, square);
@@ -118,8 +118,10 @@ light_path path_into(gpu_light light, gpu_light_sample s, int number, int paths,
             path.spreads = true;
             if (is_disk(light))
                 square = dot(off, off) + softness(light);
-            // 1 / d^2 has a mean over the cube: to the second order, its Laplacian is 2 / d^4.
-            path.intensity *= (1.0 + side * side / (12.0 * square)) / square;
+            // 1 / d^2 has a mean over the cube: to the second order, its Laplacian is 2 / d^4. Beside a point of a
+            // wide area it is no more than over a cube around a lamp.
+            float cube = side * side;
+            path.intensity *= min((1.0 + cube / (12.0 * square)) / square, 7.7 / cube);
         }
     }
     path.intensity *= light.factors.z;

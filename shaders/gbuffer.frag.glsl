@@ -3,16 +3,11 @@
 #version 450 core
 #include "lib/material.glsl"
 
-layout(std430, binding = SLOT_INSTANCES) readonly buffer instances_block
-{
-    gpu_instance instances[];
-};
-
 in vec3 world_position;
 in vec3 world_normal;
 in vec2 uv;
-flat in uint material_number;
 flat in uint instance_number;
+flat in uint visibility;
 
 layout(location = 0) out vec4 out_normal;   // world normal; view depth
 layout(location = 1) out vec4 out_diffuse;  // reflectance; roughness
@@ -21,10 +16,9 @@ layout(location = 3) out vec4 out_emission;
 
 void main()
 {
-    gpu_material material = materials[material_number];
-    vec4 base = material_base(material, uv);
-    float alpha = material_alpha(material, base);
-    if (!material_covers(material, alpha, gl_FragCoord.xy, instance_number, stage.info.x))
+    vec4 base = material_base(uv);
+    float alpha = material_alpha(base);
+    if (!material_covers(alpha, gl_FragCoord.xy, instance_number, stage.info.x))
         discard;
     if ((material.flags.x & MATERIAL_CULL_BACK) != 0u && !gl_FrontFacing)
         discard;
@@ -48,7 +42,7 @@ void main()
     float roughness = material.diffuse.w;
     if ((material.flags.x & MATERIAL_ROUGHNESS_IMAGE) != 0u)
         roughness *= texture(roughness_image, uv).r;
-    bool holdout = (instances[instance_number].flags.x & VISIBLE_HOLDOUT) != 0u;
+    bool holdout = (visibility & VISIBLE_HOLDOUT) != 0u;
     out_normal = vec4(normal, depth);
     out_diffuse = vec4(material.diffuse.rgb * base.rgb, clamp(roughness, 0.0, 1.0));
     out_specular = vec4(material.specular.rgb + material.metal.rgb * base.rgb, holdout ? 1.0 : 0.0);

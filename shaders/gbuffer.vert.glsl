@@ -3,7 +3,10 @@
 #version 450 core
 #include "lib/surface.glsl"
 
+flat out uint visibility;
+
 void main()
 {
-    place_surface(VISIBLE_CAMERA);
+    visibility = in_flags.x;
+    place_surface();
 }

@@ -7,7 +7,6 @@
 
 in vec3 world_position;
 in vec2 uv;
-flat in uint material_number;
 flat in uint instance_number;
 
 layout(binding = SLOT_OUTPUT_LINKS, r32ui) uniform uimage3D links_image;
@@ -33,9 +32,8 @@ void add_wall(ivec3 cell, vec3 reflectance, vec3 emission)
 
 void main()
 {
-    gpu_material material = materials[material_number];
-    vec4 base = material_base(material, uv);
-    if (!material_casts(material, base, gl_FragCoord.xy, instance_number, stage.info.x))
+    vec4 base = material_base(uv);
+    if (!material_casts(base, gl_FragCoord.xy, instance_number, stage.info.x))
         discard;
     ivec3 link = LINKS[stage.info.y];
     int axis = link.x != 0 ? 0 : (link.y != 0 ? 1 : 2);

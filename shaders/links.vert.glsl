@@ -7,7 +7,7 @@ out vec3 world_position;
 
 void main()
 {
-    vec4 p = instances[in_instance].world_from_object * vec4(in_position, 1.0);
+    vec4 p = world_from_object * vec4(in_position, 1.0);
     world_position = p.xyz;
-    place_corner(p, VISIBLE_SHADOW);
+    place_corner(p);
 }

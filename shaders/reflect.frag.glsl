@@ -8,7 +8,6 @@
 in vec3 world_position;
 in vec3 world_normal;
 in vec2 uv;
-flat in uint material_number;
 flat in uint instance_number;
 
 layout(location = 0) out vec4 out_position; // w: 1
@@ -26,9 +25,8 @@ bool goes_in()
 
 void main()
 {
-    gpu_material material = materials[material_number];
-    vec4 base = material_base(material, uv);
-    if (!material_casts(material, base, gl_FragCoord.xy, instance_number, stage.info.x))
+    vec4 base = material_base(uv);
+    if (!material_casts(base, gl_FragCoord.xy, instance_number, stage.info.x))
         discard;
     if (stage.eye.w != 0.0 && !goes_in())
         discard;

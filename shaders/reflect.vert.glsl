@@ -5,5 +5,5 @@
 
 void main()
 {
-    place_surface(VISIBLE_SHADOW);
+    place_surface();
 }

@@ -6,15 +6,13 @@
 #include "lib/material.glsl"
 
 in vec2 uv;
-flat in uint material_number;
 flat in uint instance_number;
 
 void main()
 {
 #ifndef OPAQUE
-    gpu_material material = materials[material_number];
-    vec4 base = material_base(material, uv);
-    if (!material_casts(material, base, gl_FragCoord.xy, instance_number, stage.info.x))
+    vec4 base = material_base(uv);
+    if (!material_casts(base, gl_FragCoord.xy, instance_number, stage.info.x))
         discard;
 #endif
 }

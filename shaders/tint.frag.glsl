@@ -4,16 +4,14 @@
 #include "lib/material.glsl"
 
 in vec2 uv;
-flat in uint material_number;
 flat in uint instance_number;
 
 layout(location = 0) out vec4 out_tint;
 
 void main()
 {
-    gpu_material material = materials[material_number];
-    float alpha = material_alpha(material, material_base(material, uv));
-    if (material_covers(material, alpha, gl_FragCoord.xy, instance_number, stage.info.x))
+    float alpha = material_alpha(material_base(uv));
+    if (material_covers(alpha, gl_FragCoord.xy, instance_number, stage.info.x))
         discard;
     out_tint = vec4(material.transparent.rgb, 1.0);
 }

@@ -5,5 +5,5 @@
 
 void main()
 {
-    place_corner(instances[in_instance].world_from_object * vec4(in_position, 1.0), VISIBLE_CAMERA);
+    place_corner(world_from_object * vec4(in_position, 1.0));
 }

@@ -6,6 +6,7 @@
 #include "scene/pack.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -229,7 +230,7 @@ static int is_flat(const struct mesh_block *mesh)
 }
 
 static void write_instance(struct gpu_instance *out, const float *world_from_object,
-                           uint32_t visibility)
+                           uint32_t visibility, uint32_t number)
 {
     float inverse[16];
     memcpy(&out->world_from_object, world_from_object, sizeof out->world_from_object);
@@ -238,7 +239,7 @@ static void write_instance(struct gpu_instance *out, const float *world_from_obj
         for (int row = 0; row < 4; ++row)
             out->normal_from_object.m[4 * column + row] =
                 column < 3 && row < 3 ? inverse[4 * row + column] : (column == row);
-    out->flags = (uvec4){visibility, 0, 0, 0};
+    out->flags = (uvec4){visibility, number, 0, 0};
 }
 
 static void add_draws(struct geometry *geometry, const struct snapshot *snapshot,
@@ -307,7 +308,6 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
         draw_count += mesh ? ((struct mesh_block *)mesh->block)->slot_count : 0;
     }
     struct gpu_instance *instances = calloc(instance_count + 1, sizeof *instances);
-    uint32_t *numbers = calloc(instance_count + 1, sizeof *numbers);
     free(geometry->draws);
     geometry->draws = calloc(draw_count + 1, sizeof *geometry->draws);
     geometry->draw_count = 0;
@@ -317,7 +317,7 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
         geometry->upper[i] = geometry->solid_upper[i] = -INFINITY;
     }
     brume_result result = BRUME_OK;
-    if (!instances || !numbers || !geometry->draws)
+    if (!instances || !geometry->draws)
         result = fail(BRUME_E_MEMORY, "no memory for %zu instances", instance_count);
 
     uint32_t next = 0;
@@ -337,8 +337,7 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
             const float *matrix = set->world_from_object + 16 * (size_t)k;
             if (!add_bounds(geometry, mesh, matrix, lower, upper))
                 continue;
-            write_instance(&instances[next], matrix, set->visibility);
-            numbers[next] = next;
+            write_instance(&instances[next], matrix, set->visibility, next);
             ++next;
         }
         if (next - first < set->count)
@@ -353,30 +352,41 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
     if (result == BRUME_OK)
         result = buffer_update(&gpu->memory, &geometry->instances, FOR_MESH,
                                (size_t)next * sizeof *instances, instances, "instances");
-    if (result == BRUME_OK)
-        result = buffer_update(&gpu->memory, &geometry->instance_numbers, FOR_MESH,
-                               (size_t)next * sizeof *numbers, numbers, "instance numbers");
     free(instances);
-    free(numbers);
     return result;
 }
 
+/* Attributes as shaders/lib/vertex.glsl has them. */
 static void make_vertex_array(struct geometry *geometry)
 {
     GLuint array;
     glCreateVertexArrays(1, &array);
     static const struct {
-        GLuint size, offset;
-    } attributes[] = {{3, 0}, {3, 12}, {2, 24}};
-    for (GLuint i = 0; i < 3; ++i) {
+        GLint size;
+        GLuint offset, binding; /* 0: a corner's, 1: an instance's */
+    } attributes[] = {
+        {3, 0, 0},
+        {3, 12, 0},
+        {2, 24, 0},
+        {4, offsetof(struct gpu_instance, world_from_object), 1},
+        {4, offsetof(struct gpu_instance, world_from_object) + 16, 1},
+        {4, offsetof(struct gpu_instance, world_from_object) + 32, 1},
+        {4, offsetof(struct gpu_instance, world_from_object) + 48, 1},
+        {3, offsetof(struct gpu_instance, normal_from_object), 1},
+        {3, offsetof(struct gpu_instance, normal_from_object) + 16, 1},
+        {3, offsetof(struct gpu_instance, normal_from_object) + 32, 1},
+    };
+    const GLuint count = sizeof attributes / sizeof *attributes;
+    for (GLuint i = 0; i < count; ++i) {
         glEnableVertexArrayAttrib(array, i);
-        glVertexArrayAttribFormat(array, i, (GLint)attributes[i].size, GL_FLOAT, GL_FALSE,
+        glVertexArrayAttribFormat(array, i, attributes[i].size, GL_FLOAT, GL_FALSE,
                                   attributes[i].offset);
-        glVertexArrayAttribBinding(array, i, 0);
+        glVertexArrayAttribBinding(array, i, attributes[i].binding);
     }
-    glEnableVertexArrayAttrib(array, 3);
-    glVertexArrayAttribIFormat(array, 3, 1, GL_UNSIGNED_INT, 0);
-    glVertexArrayAttribBinding(array, 3, 1);
+    glEnableVertexArrayAttrib(array, count);
+    glVertexArrayAttribIFormat(array, count, 2, GL_UNSIGNED_INT,
+                               offsetof(struct gpu_instance, flags));
+    glVertexArrayAttribBinding(array, count, 1);
     glVertexArrayBindingDivisor(array, 1, 1);
     geometry->vertex_array = array;
 }
@@ -397,7 +407,7 @@ uint64_t geometry_bytes(const struct snapshot *snapshot)
         bytes += (uint64_t)image->width * (uint64_t)image->height * texel * 4 / 3 + 16;
     }
     for (uint32_t i = 0; i < sets->count; ++i)
-        bytes += (sizeof(struct gpu_instance) + sizeof(uint32_t)) *
+        bytes += sizeof(struct gpu_instance) *
                  (uint64_t)((struct instances_block *)sets->entries[i].block)->count;
     return bytes;
 }
@@ -454,10 +464,9 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
     TRY(buffer_update(&gpu->memory, &geometry->stage_block, FOR_TARGET, sizeof *stage, stage,
                       "draw stage"));
     glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_STAGE, geometry->stage_block.id);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_INSTANCES, geometry->instances.id);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_MATERIALS, geometry->materials.id);
     glBindVertexArray(geometry->vertex_array);
-    glVertexArrayVertexBuffer(geometry->vertex_array, 1, geometry->instance_numbers.id, 0, 4);
+    glVertexArrayVertexBuffer(geometry->vertex_array, 1, geometry->instances.id, 0,
+                              sizeof(struct gpu_instance));
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER); /* reversed depth */
     if (pass == GEOMETRY_TINT) {
@@ -475,7 +484,9 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
         glVertexArrayVertexBuffer(geometry->vertex_array, 0, draw->corners, 0, 32);
         glBindTextureUnit(SLOT_MATERIAL_BASE, draw->base_image);
         glBindTextureUnit(SLOT_MATERIAL_ROUGHNESS, draw->roughness_image);
-        glVertexAttribI1ui(4, draw->material);
+        glBindBufferRange(GL_UNIFORM_BUFFER, SLOT_MATERIAL, geometry->materials.id,
+                          (GLintptr)(draw->material * sizeof(struct gpu_material)),
+                          sizeof(struct gpu_material));
         glDrawArraysInstancedBaseInstance(GL_TRIANGLES, (GLint)draw->first_corner,
                                           (GLsizei)draw->corner_count,
                                           (GLsizei)draw->instance_count, draw->first_instance);
@@ -493,7 +504,6 @@ void geometry_finish(struct gpu *gpu, struct geometry *geometry)
     for (uint32_t i = 0; i < geometry->image_count; ++i)
         texture_finish(&gpu->memory, &geometry->images[i].texture);
     buffer_finish(&gpu->memory, &geometry->instances);
-    buffer_finish(&gpu->memory, &geometry->instance_numbers);
     buffer_finish(&gpu->memory, &geometry->materials);
     buffer_finish(&gpu->memory, &geometry->stage_block);
     if (geometry->vertex_array)

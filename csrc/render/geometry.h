@@ -39,7 +39,7 @@ struct geometry {
     uint32_t image_count;
     struct draw *draws;
     uint32_t draw_count;
-    struct buffer instances, instance_numbers, materials, stage_block;
+    struct buffer instances, materials, stage_block;
     GLuint vertex_array;
     uint32_t triangle_count;      /* instances counted */
     float brightest;              /* the greatest emission of a material, W/(sr m^2) */

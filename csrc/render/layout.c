@@ -5,7 +5,7 @@
 _Static_assert(sizeof(struct gpu_light) == 128, "gpu_light");
 _Static_assert(sizeof(struct gpu_light_sample) == 32, "gpu_light_sample");
 _Static_assert(sizeof(struct gpu_shadow_view) == 96, "gpu_shadow_view");
-_Static_assert(sizeof(struct gpu_material) == 96, "gpu_material");
+_Static_assert(sizeof(struct gpu_material) == 256, "gpu_material");
 _Static_assert(sizeof(struct gpu_instance) == 144, "gpu_instance");
 _Static_assert(sizeof(struct gpu_draw) == 112, "gpu_draw");
 _Static_assert(sizeof(struct gpu_lattice_pass) == 32, "gpu_lattice_pass");

@@ -5,11 +5,10 @@
 out vec3 world_position;
 out vec3 world_normal;
 
-void place_surface(uint visibility)
+void place_surface()
 {
-    gpu_instance instance = instances[in_instance];
-    vec4 p = instance.world_from_object * vec4(in_position, 1.0);
+    vec4 p = world_from_object * vec4(in_position, 1.0);
     world_position = p.xyz;
-    world_normal = mat3(instance.normal_from_object) * in_normal;
-    place_corner(p, visibility);
+    world_normal = normal_from_object * in_normal;
+    place_corner(p);
 }

@@ -32,10 +32,9 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_LEVEL 2
 #define SLOT_ORDINATES 3     /* and as a storage buffer where they are written */
 #define SLOT_LEVEL_BEFORE 4  /* DOM: a lattice of the last run */
+#define SLOT_MATERIAL 5
 
 /* Storage buffers */
-#define SLOT_MATERIALS 0
-#define SLOT_INSTANCES 1
 #define SLOT_ACCUMULATION 2
 #define SLOT_DEPTH_SOURCES 4
 #define SLOT_REST 4
@@ -211,6 +210,7 @@ struct gpu_material {
     vec4 emission;
     vec4 transparent;
     uvec4 flags;
+    vec4 padding[10]; /* a device may want uniform blocks to begin at multiples of 256 bytes */
 };
 
 /* As brume_visibility of brume.h. */
@@ -221,7 +221,7 @@ struct gpu_material {
 struct gpu_instance {
     mat4 world_from_object;
     mat4 normal_from_object; /* inverse transpose */
-    uvec4 flags;             /* brume_visibility bits */
+    uvec4 flags;             /* brume_visibility bits, its number */
 };
 
 /* The drawing stages' block: one shadow layer, or the camera. */

@@ -7,7 +7,7 @@
 
 /* Bytes of a cell: of the field, and of what is needed while it is found. */
 #define FIELD_CELL_BYTES 64
-#define FIELD_WORKING_BYTES 272 /* and one layer more of what is cut */
+#define FIELD_WORKING_BYTES 280 /* and one layer more of what is cut */
 #define FIELD_FUZZY_BYTES 96 /* the same, for fuzzy blockers, and one layer more of their lattice */
 /* Beside the lattice: reflective shadow maps, and blocks. */
 #define FIELD_FIXED_BYTES (3u << 20)

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Blockers from geometry: drawn once along each of the 13 links, so that a pixel's centre is a line
- * through cells' centres and a fragment a cut of one link. Exact, however thin a wall is. */
+/* Blockers from geometry: drawn along each of the 13 links, so that a pixel's centre is a line
+ * through cells' centres and a fragment a cut of one link. Exact, however thin a wall is. Drawn once
+ * more, what is nearest to the cells at a link's ends tells them what it reflects and emits: not the
+ * ground below a floor's tiles, nor the other side of a wall. */
 #include "base/result.h"
 #include "transport/lpv.h"
 
@@ -48,33 +50,48 @@ static brume_result draw(struct lpv_work *work, GLuint framebuffer)
 {
     const struct transport_input *input = work->input;
     const float brightest = input->geometry->brightest;
-    for (int i = 0; i < LINKS; ++i) {
+    for (int i = 0; i < 2 * LINKS; ++i) {
         int size[2];
-        const struct gpu_draw stage = {.clip_from_world = view_along(work->field, links[i], size),
-                                       .clip.w = brightest > 0.0f ? 1.0f / brightest : 0.0f,
-                                       .info = {0, (uint32_t)i, 0, 0}};
+        const int link = i / 2;
+        const struct gpu_draw stage = {
+            .clip_from_world = view_along(work->field, links[link], size),
+            .clip.w = brightest > 0.0f ? 1.0f / brightest : 0.0f,
+            .info = {0, (uint32_t)link, (uint32_t)(i % 2), 0}};
         glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_WIDTH, size[0]);
         glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_HEIGHT, size[1]);
         glViewport(0, 0, size[0], size[1]);
         TRY(geometry_draw(input->gpu, input->geometry, &stage, BRUME_VISIBLE_SHADOW,
                           GEOMETRY_LINKS));
+        glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     }
     return BRUME_OK;
 }
 
-brume_result lpv_cut_links(struct lpv_work *work)
+static void begin_with_nothing(int slot, const struct texture *texture)
 {
     static const uint32_t none;
-    glClearTexImage(work->links.id, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, &none);
-    glClearTexImage(work->walls.id, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, &none);
-    glBindImageTexture(SLOT_OUTPUT_LINKS, work->links.id, 0, GL_TRUE, 0, GL_READ_WRITE, GL_R32UI);
-    glBindImageTexture(SLOT_OUTPUT_WALLS, work->walls.id, 0, GL_TRUE, 0, GL_READ_WRITE, GL_R32UI);
+    glClearTexImage(texture->id, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, &none);
+    glBindImageTexture((GLuint)slot, texture->id, 0, GL_TRUE, 0, GL_READ_WRITE, GL_R32UI);
+}
+
+brume_result lpv_cut_links(struct lpv_work *work)
+{
+    struct memory *memory = &work->input->gpu->memory;
+    const ivec4 dims = work->field->dims;
+    struct texture nearest = {0};
+    TRY(texture_init(memory, &nearest, FOR_TRANSPORT, GL_TEXTURE_3D, GL_R32UI,
+                     texture_side(2 * dims.x), texture_side(dims.y), texture_side(dims.z), 1,
+                     "nearest surfaces"));
+    begin_with_nothing(SLOT_OUTPUT_LINKS, &work->links);
+    begin_with_nothing(SLOT_OUTPUT_WALLS, &work->walls);
+    begin_with_nothing(SLOT_OUTPUT_NEAREST, &nearest);
     GLuint framebuffer;
     glCreateFramebuffers(1, &framebuffer);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     const brume_result result = draw(work, framebuffer);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glDeleteFramebuffers(1, &framebuffer);
+    texture_finish(memory, &nearest);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     return result;
 }

@@ -101,6 +101,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_OUTPUT_HALF 1
 #define SLOT_OUTPUT_LINKS 0
 #define SLOT_OUTPUT_WALLS 1
+#define SLOT_OUTPUT_NEAREST 2
 #define SLOT_OUTPUT_FIELD 3  /* and two more */
 
 /* Layers of what is marched at half the resolution: colours, and in w */

@@ -298,6 +298,31 @@ static void light_between_walls(void **state)
     }
 }
 
+/* Cells know what walls reflect on their side: not what touches these from behind, as the ground
+ * does below a floor's tiles. */
+static void behind_walls(void **state)
+{
+    (void)state;
+    static const float lamp[3] = {0.2f, -0.1f, 0.3f};
+    const brume_settings settings = settings_for(16);
+    double means[2];
+    for (int i = 0; i < 2; ++i) {
+        brume_scene *scene = empty();
+        add_box(scene, 1, 1.0f, 0.8f);
+        if (i)
+            add_box(scene, 3, 1.001f, 0.0f);
+        add_lamp(scene, 2, lamp, 1.0f);
+        brume_stats stats;
+        struct field field = field_of(scene, &settings, &stats);
+        means[i] = mean_fluence(&field, 0);
+        free(field.texels);
+        brume_scene_destroy(scene);
+    }
+    print_message("black walls behind: mean fluence %+.2f %%\n",
+                  100.0 * (means[1] / means[0] - 1.0));
+    assert_close(means[1], means[0], 0.01);
+}
+
 /* In a closed white box all of a lamp's power ends in the fog, however little that absorbs: the
  * light crosses the box hundreds of times. */
 static void white_room(void **state)
@@ -478,11 +503,17 @@ static void nothing_odd_comes_of_chance(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(quadratures),           cmocka_unit_test(furnaces),
-        cmocka_unit_test(few_iterations),        cmocka_unit_test(cube),
-        cmocka_unit_test(light_between_walls),   cmocka_unit_test(white_room),
-        cmocka_unit_test(glowing_walls),         cmocka_unit_test(glowing_thing),
-        cmocka_unit_test(nothing_odd_comes_out), cmocka_unit_test(nothing_odd_comes_of_chance),
+        cmocka_unit_test(quadratures),
+        cmocka_unit_test(furnaces),
+        cmocka_unit_test(few_iterations),
+        cmocka_unit_test(cube),
+        cmocka_unit_test(light_between_walls),
+        cmocka_unit_test(behind_walls),
+        cmocka_unit_test(white_room),
+        cmocka_unit_test(glowing_walls),
+        cmocka_unit_test(glowing_thing),
+        cmocka_unit_test(nothing_odd_comes_out),
+        cmocka_unit_test(nothing_odd_comes_of_chance),
     };
     const struct CMUnitTest long_tests[] = {
         cmocka_unit_test(fine_cube),

@@ -13,18 +13,30 @@
 /* m; squares of distances stay finite floats. */
 #define FARTHEST 1e15f
 #define HALF_MAX 65504.0f
-#define TRIANGLE_BYTES (24 * sizeof(float)) /* three corners of position, normal and uv */
+#define VERTEX_BYTES (8 * sizeof(float)) /* position, normal and uv */
+#define TRIANGLE_BYTES (3 * sizeof(uint32_t)) /* its corners' numbers */
 
 /* --- Caches ------------------------------------------------------------------------------- */
+
+static void finish_mesh(struct gpu *gpu, struct gpu_mesh *mesh)
+{
+    buffer_finish(&gpu->memory, &mesh->vertices);
+    buffer_finish(&gpu->memory, &mesh->corners);
+}
 
 static brume_result upload_mesh(struct gpu *gpu, struct gpu_mesh *mesh, const struct entry *entry)
 {
     const struct mesh_block *source = (const struct mesh_block *)entry->block;
     mesh->key = entry->key;
     mesh->revision = entry->revision;
-    return buffer_init(&gpu->memory, &mesh->corners, FOR_MESH,
-                       (uint64_t)source->triangle_count * TRIANGLE_BYTES, source->corners,
-                       source->name);
+    TRY(buffer_init(&gpu->memory, &mesh->vertices, FOR_MESH,
+                    (uint64_t)source->vertex_count * VERTEX_BYTES, source->vertices, source->name));
+    const brume_result result = buffer_init(&gpu->memory, &mesh->corners, FOR_MESH,
+                                            (uint64_t)source->triangle_count * TRIANGLE_BYTES,
+                                            source->corners, source->name);
+    if (result != BRUME_OK)
+        finish_mesh(gpu, mesh);
+    return result;
 }
 
 static int mip_levels(int width, int height)
@@ -83,7 +95,7 @@ static brume_result sync_meshes(struct gpu *gpu, struct geometry *geometry,
         struct gpu_mesh *mesh = &geometry->meshes[i];
         const struct entry *entry = table_find(table, mesh->key);
         if (!entry || entry->revision != mesh->revision)
-            buffer_finish(&gpu->memory, &mesh->corners);
+            finish_mesh(gpu, mesh);
     }
     uint32_t old = 0, count = 0;
     for (uint32_t i = 0; i < table->count; ++i) {
@@ -253,7 +265,8 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
         if (first == end)
             continue;
         struct draw *draw = &geometry->draws[geometry->draw_count++];
-        *draw = (struct draw){.corners = gpu_mesh->corners.id,
+        *draw = (struct draw){.vertices = gpu_mesh->vertices.id,
+                              .corners = gpu_mesh->corners.id,
                               .first_corner = 3 * first,
                               .corner_count = 3 * (end - first),
                               .first_instance = first_instance,
@@ -398,9 +411,11 @@ uint64_t geometry_bytes(const struct snapshot *snapshot)
     const struct table *sets = &snapshot->tables[BRUME_KIND_INSTANCES];
     uint64_t bytes = ((uint64_t)snapshot->tables[BRUME_KIND_MATERIAL].count + 1) *
                      sizeof(struct gpu_material);
-    for (uint32_t i = 0; i < meshes->count; ++i)
-        bytes += TRIANGLE_BYTES *
-                 (uint64_t)((struct mesh_block *)meshes->entries[i].block)->triangle_count;
+    for (uint32_t i = 0; i < meshes->count; ++i) {
+        const struct mesh_block *mesh = (struct mesh_block *)meshes->entries[i].block;
+        bytes += VERTEX_BYTES * (uint64_t)mesh->vertex_count +
+                 TRIANGLE_BYTES * (uint64_t)mesh->triangle_count;
+    }
     for (uint32_t i = 0; i < images->count; ++i) {
         const struct image_block *image = (struct image_block *)images->entries[i].block;
         const uint64_t texel = image->maximum > HALF_MAX ? 16 : 8;
@@ -481,15 +496,17 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
             is_outside(draw, &stage->clip_from_world))
             continue;
         glUseProgram(draw->opaque ? opaque->id : program->id);
-        glVertexArrayVertexBuffer(geometry->vertex_array, 0, draw->corners, 0, 32);
+        glVertexArrayVertexBuffer(geometry->vertex_array, 0, draw->vertices, 0, VERTEX_BYTES);
+        glVertexArrayElementBuffer(geometry->vertex_array, draw->corners);
         glBindTextureUnit(SLOT_MATERIAL_BASE, draw->base_image);
         glBindTextureUnit(SLOT_MATERIAL_ROUGHNESS, draw->roughness_image);
         glBindBufferRange(GL_UNIFORM_BUFFER, SLOT_MATERIAL, geometry->materials.id,
                           (GLintptr)(draw->material * sizeof(struct gpu_material)),
                           sizeof(struct gpu_material));
-        glDrawArraysInstancedBaseInstance(GL_TRIANGLES, (GLint)draw->first_corner,
-                                          (GLsizei)draw->corner_count,
-                                          (GLsizei)draw->instance_count, draw->first_instance);
+        glDrawElementsInstancedBaseInstance(
+            GL_TRIANGLES, (GLsizei)draw->corner_count, GL_UNSIGNED_INT,
+            (const void *)(draw->first_corner * sizeof(uint32_t)), (GLsizei)draw->instance_count,
+            draw->first_instance);
     }
     glDisable(GL_DEPTH_TEST);
     glDisable(GL_BLEND);
@@ -500,7 +517,7 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
 void geometry_finish(struct gpu *gpu, struct geometry *geometry)
 {
     for (uint32_t i = 0; i < geometry->mesh_count; ++i)
-        buffer_finish(&gpu->memory, &geometry->meshes[i].corners);
+        finish_mesh(gpu, &geometry->meshes[i]);
     for (uint32_t i = 0; i < geometry->image_count; ++i)
         texture_finish(&gpu->memory, &geometry->images[i].texture);
     buffer_finish(&gpu->memory, &geometry->instances);

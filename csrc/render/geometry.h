@@ -11,7 +11,7 @@
 
 struct gpu_mesh {
     uint64_t key, revision;
-    struct buffer corners;
+    struct buffer vertices, corners;
 };
 
 struct gpu_image {
@@ -23,7 +23,7 @@ struct gpu_image {
 /* One draw: the triangles of one material slot, for all instances of a set. */
 struct draw {
     float lower[3], upper[3]; /* of the set, in the world */
-    GLuint corners, base_image, roughness_image;
+    GLuint vertices, corners, base_image, roughness_image;
     uint32_t first_corner, corner_count;
     uint32_t first_instance, instance_count;
     uint32_t material;

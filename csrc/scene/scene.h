@@ -13,8 +13,9 @@
 struct mesh_block {
     struct block block;
     char name[64];
-    uint32_t triangle_count, slot_count;
-    float *corners;      /* 8 floats a corner: position, normal, uv; sorted by slot */
+    uint32_t triangle_count, vertex_count, slot_count;
+    float *vertices;      /* 8 floats each: position, normal, uv */
+    uint32_t *corners;    /* 3 a triangle, sorted by slot: numbers of vertices */
     uint32_t *slot_first; /* slot_count + 1: first triangle of each slot */
     uint64_t *materials; /* slot_count */
     float lower[3], upper[3];

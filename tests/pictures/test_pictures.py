@@ -4,9 +4,9 @@
 Run outside Blender: python3 -m pytest tests/pictures. Each case leaves a PNG in out/pictures/:
 Brume | Cycles | four times the difference around grey. With --preset FINAL its name ends in -FINAL.
 """
-import functools
 import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -18,12 +18,25 @@ import references
 from cases import CASES, ROOT
 
 OUT = os.path.join(ROOT, 'out', 'pictures')
+SAME = 'plume'  # rendered twice
 
 
-@functools.cache
-def brume(name, preset='PREVIEW'):
-    return references.render(conftest.BLENDER, 'BRUME', CASES[name], '--preset', preset,
-                             timeout=7200 if preset == 'FINAL' else 900)
+@pytest.fixture(scope='session')
+def brume(request):
+    """Brume's pictures of the cases that were asked for, by their names: a function that waits for
+    one. Two are rendered at a time, since half of a Blender's time but one thread has work."""
+    preset = request.config.getoption('--preset')
+    asked = [item.callspec.params['name'] if hasattr(item, 'callspec') else SAME
+             for item in request.session.items if 'brume' in item.fixturenames]
+
+    def render(name):
+        return references.render(conftest.BLENDER, 'BRUME', CASES[name], '--preset', preset,
+                                 timeout=7200 if preset == 'FINAL' else 900)
+
+    with ThreadPoolExecutor(2) as pool:
+        pictures = {name: pool.submit(render, name) for name in dict.fromkeys(asked)}
+        yield lambda name: pictures[name].result()
+        pool.shutdown(cancel_futures=True)
 
 
 @pytest.fixture
@@ -37,13 +50,13 @@ def reference(request):
 @pytest.mark.parametrize('name', [
     pytest.param(name, marks=pytest.mark.fluid if case.scene == 'plume' else ())
     for name, case in CASES.items()])
-def test_against_cycles(name, reference, request):
+def test_against_cycles(name, reference, brume, request):
     case = CASES[name]
     preset = request.config.getoption('--preset')
     expected, apart, where = reference
     # Two seeds differ by twice the error of their mean, in this measure: it must not decide.
     assert apart / 2 < case.tolerance / 4, f'the reference is too noisy: {apart:.4f}'
-    found = brume(name, preset)
+    found = brume(name)
     picture, expected_picture = (passes['Combined'][..., :3] for passes in (found, expected))
     os.makedirs(OUT, exist_ok=True)
     suffix = '' if preset == 'PREVIEW' else '-' + preset
@@ -72,7 +85,7 @@ def test_against_cycles(name, reference, request):
 
 
 @pytest.mark.parametrize('name', ['surfaces-passes'])
-def test_passes_against_cycles(name, reference):
+def test_passes_against_cycles(name, reference, brume):
     """Depth and normal are those of the same point of the same triangle; a hundredth of the pixels
     may have an edge so near that the two see other sides of it."""
     ours, (theirs, *_) = brume(name), reference
@@ -88,9 +101,10 @@ def test_passes_against_cycles(name, reference):
 
 
 @pytest.mark.fluid
-def test_same_file_gives_same_pixels():
-    again = references.render(conftest.BLENDER, 'BRUME', CASES['plume'])
-    assert np.array_equal(brume('plume')['Combined'], again['Combined'])
+def test_same_file_gives_same_pixels(brume, request):
+    again = references.render(conftest.BLENDER, 'BRUME', CASES[SAME], '--preset',
+                              request.config.getoption('--preset'))
+    assert np.array_equal(brume(SAME)['Combined'], again['Combined'])
 
 
 def test_measure_sees_what_it_should():

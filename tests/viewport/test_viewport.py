@@ -2,17 +2,19 @@
 """Brume in Blender's window, on a virtual display: real keys and mouse, and the screen's pixels.
 
 Each theme (seen.py, views.py …) is played in one Blender, its scenarios one after another; what
-they assert is in there. Slow ones are played with BRUME_SLOW=1 alone.
+they assert is in there. Two are played at a time: each waits for a third of its own. Slow scenarios
+are played with BRUME_SLOW=1 alone.
 """
 
-import functools
 import json
 import os
+from concurrent.futures import ThreadPoolExecutor
 
 import launch
 import pytest
 
-THEMES = "seen", "views", "methods", "colour", "living", "playback", "edits", "latency"
+THEMES = "living", "views", "seen", "edits", "playback", "colour", "methods", "latency"
+COMPARES_TIMES = "latency"  # played by itself, when the others are through
 SLOW = os.environ.get("BRUME_SLOW") == "1"
 QUIT_AFTER_S = 0.0, 0.3, 1.0, 3.0
 
@@ -29,23 +31,31 @@ SCENARIOS = [pytest.param(theme, name, marks=marks_of(theme, name))
              for theme in THEMES for name in names_of(theme)]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def played(request):
-    """The run of a theme, with those of its scenarios that were asked for."""
-    @functools.cache
-    def run(theme):
-        asked = [item.callspec.params.get("name") for item in request.session.items
-                 if hasattr(item, "callspec") and item.callspec.params.get("theme") == theme]
-        return launch.play(theme, [name for name in names_of(theme) if name in asked])
-    return request.config.stash.setdefault(RUNS, run)
+    """The runs of the themes that were asked for, by their names, each with those of its scenarios
+    that were."""
+    asked = {}
+    for item in request.session.items:
+        params = item.callspec.params if hasattr(item, "callspec") else {}
+        if "theme" in params:
+            asked.setdefault(params["theme"], set()).add(params.get("name"))
 
+    def play(theme):
+        return launch.play(theme, [name for name in names_of(theme) if name in asked[theme]])
 
-RUNS = pytest.StashKey()
+    with ThreadPoolExecutor(2) as pool:
+        runs = {theme: pool.submit(play, theme) for theme in THEMES
+                if theme in asked and theme != COMPARES_TIMES}
+        found = {theme: run.result() for theme, run in runs.items()}
+    if COMPARES_TIMES in asked:
+        found[COMPARES_TIMES] = play(COMPARES_TIMES)
+    return found
 
 
 @pytest.mark.parametrize("theme, name", SCENARIOS)
 def test_scenario(played, theme, name):
-    run = played(theme)
+    run = played[theme]
     assert name in run.results, f"Blender ended before, with {run.status}: {run.said[-4000:]}"
     result = run.results[name]
     print(f"{result['seconds']} s, {json.dumps(result['values'])}")
@@ -54,7 +64,7 @@ def test_scenario(played, theme, name):
 
 @pytest.mark.parametrize("theme", THEMES)
 def test_blender_ends_well(played, theme):
-    run = played(theme)
+    run = played[theme]
     assert run.status == 0, run.said[-4000:]
     assert not run.wrong
 

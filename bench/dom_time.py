@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far off pictures are against the time they take: Brume's methods, EEVEE, and Cycles with ever
-more samples. Appends a JSON line a scene to out/bench/dom_time.jsonl, and draws it as
+more samples. Appends a JSON line a scene to out/bench/dom_time.jsonl, which --plots draws as
 docs/images/dom_time_SCENE.svg; pictures, Brume | Cycles | difference, go to out/bench/dom_time:
 
     python3 bench/dom_time.py [--scenes cube cloud ...] [--quick]
+    python3 bench/dom_time.py --plots
 
 Errors are of linear RGB, of pixels or of means of blocks, 32 in a row: the root of the mean square
 of the difference, over the mean of the reference; nothing is clipped. References are two halves, R1
@@ -276,7 +277,6 @@ def main():
         line = {'bench': 'dom_time', **here(), 'device': device, 'resolution': list(size),
                 'scene': name, **measure(name, size, options)}
         keep(line, shown=False)
-        draw(name, line)
         print(told(name, line), flush=True)
 
 

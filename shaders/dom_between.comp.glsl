@@ -12,7 +12,7 @@ layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GR
 // scattered_lattice is as dom_eye leaves it: w: 1 where nothing scatters.
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D between_image; // w: 1 where surfaces
-                                                                             // cut the cell's links
+                                         // part the cells that are interpolated between from this one on
 
 const float SHARE = 0.125;
 
@@ -55,6 +55,18 @@ vec3 gone_on(ivec3 cell, uint cuts)
     return sum.rgb / max(sum.w, 1e-3);
 }
 
+// Whether links between the cell and the seven beyond it along the axes are cut.
+bool parted_from_here(ivec3 cell)
+{
+    bool parted = false;
+    for (int corner = 0; corner < 8; ++corner) {
+        ivec3 at = cell + ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
+        if (in_level(at))
+            parted = parted || (cuts_of(level, at) & LINKS_BETWEEN[corner]) != 0u;
+    }
+    return parted;
+}
+
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID);
@@ -63,5 +75,5 @@ void main()
     vec4 mean = texelFetch(scattered_lattice, above(cell), 0);
     uint cuts = cuts_of(level, cell);
     vec3 light = mean.w == 0.0 ? sharpened(cell, cuts, mean.rgb) : gone_on(cell, cuts);
-    imageStore(between_image, above(cell), fit(light, cuts == 0u ? 0.0 : 1.0));
+    imageStore(between_image, above(cell), fit(light, parted_from_here(cell) ? 1.0 : 0.0));
 }

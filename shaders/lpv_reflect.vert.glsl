@@ -6,6 +6,7 @@
 #include "lib/transmittance.glsl"
 #include "lib/shadow.glsl"
 #include "lib/level.glsl"
+#include "lib/cuts.glsl"
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
@@ -53,12 +54,13 @@ ivec3 cell_at(vec3 p, vec3 normal)
 bool is_parted(ivec3 a, ivec3 b)
 {
     ivec3 link = b - a;
-    for (int i = 0; i < 13; ++i) {
-        ivec3 from = link == LINKS[i] ? a : b;
-        if (link == LINKS[i] || link == -LINKS[i])
-            return in_links(from) && (texelFetch(links, links_texel(from), 0).r >> i & 1u) != 0u;
-    }
-    return link != ivec3(0);
+    if (any(greaterThan(abs(link), ivec3(1))))
+        return true;
+    uint number = link_number(link);
+    bool along = number < 13u; // else it is b's, against that
+    ivec3 from = along ? a : b;
+    uint cut = texelFetch(links, links_texel(from), 0).r >> (along ? number : number - 13u) & 1u;
+    return link != ivec3(0) && in_links(from) && cut != 0u;
 }
 
 void main()

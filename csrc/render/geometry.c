@@ -495,14 +495,17 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
             (pass == GEOMETRY_TINT && !draw->tinted) ||
             is_outside(draw, &stage->clip_from_world))
             continue;
+        const bool bare = pass == GEOMETRY_SHADOW && draw->opaque; /* nothing of it is asked */
         glUseProgram(draw->opaque ? opaque->id : program->id);
         glVertexArrayVertexBuffer(geometry->vertex_array, 0, draw->vertices, 0, VERTEX_BYTES);
         glVertexArrayElementBuffer(geometry->vertex_array, draw->corners);
+        if (!bare) {
         glBindTextureUnit(SLOT_MATERIAL_BASE, draw->base_image);
         glBindTextureUnit(SLOT_MATERIAL_ROUGHNESS, draw->roughness_image);
         glBindBufferRange(GL_UNIFORM_BUFFER, SLOT_MATERIAL, geometry->materials.id,
                           (GLintptr)(draw->material * sizeof(struct gpu_material)),
                           sizeof(struct gpu_material));
+        }
         glDrawElementsInstancedBaseInstance(
             GL_TRIANGLES, (GLsizei)draw->corner_count, GL_UNSIGNED_INT,
             (const void *)(draw->first_corner * sizeof(uint32_t)), (GLsizei)draw->instance_count,

@@ -186,10 +186,19 @@ static brume_result lamp(struct lpv_work *work, struct maps *maps, int number, i
     return end_sample(work);
 }
 
-/* Of several samples of a light some are taken, evenly. */
-static uint32_t taken(const struct gpu_light *light)
+/* Of several samples of a light some are taken, evenly; of a sun no more than rims of shadows are
+ * cells wide where it has come all through the lattice. */
+static uint32_t taken(const struct lpv_work *work, const struct gpu_light *light)
 {
-    return light->samples.y < LAMP_SAMPLES ? light->samples.y : LAMP_SAMPLES;
+    uint32_t most = LAMP_SAMPLES;
+    if (light->info.x == LIGHT_SUN) {
+        const ivec4 dims = work->field->dims;
+        const double cells = sqrt((double)dims.x * dims.x + (double)dims.y * dims.y +
+                                  (double)dims.z * dims.z);
+        const double wide = ceil(2.0 * (double)light->axis.w * cells);
+        most = wide < LAMP_SAMPLES ? (uint32_t)fmax(wide, 1.0) : LAMP_SAMPLES;
+    }
+    return light->samples.y < most ? light->samples.y : most;
 }
 
 static brume_result all_maps(struct lpv_work *work, struct maps *maps)
@@ -199,7 +208,7 @@ static brume_result all_maps(struct lpv_work *work, struct maps *maps)
         const struct gpu_light *light = &input->lights[i];
         if (light->radiance.x + light->radiance.y + light->radiance.z <= 0.0f)
             continue;
-        const uint32_t count = taken(light);
+        const uint32_t count = taken(work, light);
         for (uint32_t s = 0; s < count; ++s) {
             const int sample = (int)(light->samples.x + s * light->samples.y / count);
             const float scale = 1.0f / (float)count;

@@ -7,9 +7,19 @@ const uint NUMBERS[27] = uint[](
     22u, 20u, 12u, 18u, 15u, 6u, 24u, 8u, 10u, 16u, 14u, 4u, 13u, 31u,
     0u, 17u, 1u, 3u, 23u, 21u, 11u, 19u, 2u, 5u, 25u, 7u, 9u);
 
+// The links from one of eight cells around a corner to the others, by which it is: as in point_in_cube(), x first.
+const uint LINKS_BETWEEN[8] = uint[](
+    0x00002afu, 0x20a2086u, 0x0204835u, 0x0a96004u,
+    0x000854bu, 0x106a102u, 0x010d051u, 0x055e000u);
+
+uint link_number(ivec3 offset)
+{
+    return NUMBERS[9 * offset.z + 3 * offset.y + offset.x + 13];
+}
+
 uint link_bit(ivec3 offset)
 {
-    return 1u << NUMBERS[9 * offset.z + 3 * offset.y + offset.x + 13];
+    return 1u << link_number(offset);
 }
 
 // Whether a surface cuts the link from a cell with those cut links, by the offset to its neighbour.

@@ -219,10 +219,16 @@ vec3 field_scatter(vec3 p, vec3 out_direction, float g)
     return max(light.fluence + 3.0 * g * (out_direction * light.flux), vec3(0.0)) / (4.0 * PI);
 }
 
-vec4 scattered_at(gpu_field field, vec3 at)
+vec3 scattered_at(gpu_field field, vec3 at)
 {
     at.z += float(field.dims.w);
-    return textureLod(scattered_lattice, at / vec3(textureSize(scattered_lattice, 0)), 0.0);
+    return textureLod(scattered_lattice, at / vec3(textureSize(scattered_lattice, 0)), 0.0).rgb;
+}
+
+// Whether surfaces part the cells that this interpolates between.
+bool scattered_parted(gpu_field field, vec3 at)
+{
+    return texelFetch(scattered_lattice, texel_of(field, ivec3(at - 0.5), 0), 0).w > 0.0;
 }
 
 // The same as the cells of one of DOM's lattices scatter it, per unit of sigma_s: of the cells on the point's
@@ -231,14 +237,14 @@ vec3 scattered_in(gpu_field field, vec3 p)
 {
     vec3 at = (p - field.lower.xyz) / field.lower.w;
     vec3 last = clamp(at, vec3(0.5), vec3(field.dims.xyz) - 0.5);
-    vec4 light = scattered_at(field, last);
+    vec3 light = scattered_at(field, last);
     // Beyond the outermost cells' centres it goes on as before them.
     if (at != last) {
-        vec3 before = scattered_at(field, clamp(2.0 * last - at, vec3(0.5), vec3(field.dims.xyz) - 0.5)).rgb;
-        light.rgb = clamp(2.0 * light.rgb - before, vec3(0.0), 2.0 * light.rgb);
+        vec3 before = scattered_at(field, clamp(2.0 * last - at, vec3(0.5), vec3(field.dims.xyz) - 0.5));
+        light = clamp(2.0 * light - before, vec3(0.0), 2.0 * light);
     }
-    if (light.w <= 0.0)
-        return light.rgb;
+    if (!scattered_parted(field, last))
+        return light;
     cells_between cells = cells_around(field, p);
     vec4 sum = vec4(0.0);
     int corner = 0;
@@ -247,7 +253,7 @@ vec3 scattered_in(gpu_field field, vec3 p)
         float weight = share_of_cell(cells, field, corner, vec4(0.0, 0.0, 0.0, -1.0), cell);
         sum += weight * vec4(texelFetch(scattered_lattice, texel_of(field, cell, 0), 0).rgb, 1.0);
     } while (++corner < 8);
-    return sum.w > 1e-3 ? sum.rgb / sum.w : light.rgb;
+    return sum.w > 1e-3 ? sum.rgb / sum.w : light;
 }
 
 vec3 field_scattered(vec3 p)
@@ -277,9 +283,8 @@ bool field_scattered_open(gpu_field finest, vec3 p, out vec3 light)
     if (any(lessThan(at, vec3(0.5))) || any(greaterThan(at, vec3(finest.dims.xyz) - 0.5)) ||
         frame.field.x > 1 && share_of(finest, p) < 1.0)
         return false;
-    vec4 there = scattered_at(finest, at);
-    light = there.rgb;
-    return there.w <= 0.0;
+    light = scattered_at(finest, at);
+    return !scattered_parted(finest, at);
 }
 
 // Band 2 of the radiance from, or to, a direction.

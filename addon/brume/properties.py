@@ -23,7 +23,7 @@ PRESETS = {
               "half_resolution_volumes": True, "shadow_resolution": 256,
               "light_samples": 4, "world_samples": 32},
     'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64,
-                "field_resolution": 32, "ordinates": '48', "step": 3.0,
+                "field_resolution": 32, "ordinates": '96', "step": 3.0,
                 "half_resolution_volumes": True, "shadow_resolution": 512, "light_samples": 8,
                 "world_samples": 128},
     'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96,
@@ -100,9 +100,9 @@ class BrumeSettings(bpy.types.PropertyGroup):
         description="Directions that scattered and reflected light goes along. Time and memory "
                     "grow in proportion",
         items=[('26', "26", "Quick, for a first look: bright spots show as beams", 26),
-               ('48', "48", "For most scenes", 48),
-               ('96', "96", "For thin fog in rooms with small bright spots, and to see whether "
-                            "fewer would do", 96)])
+               ('48', "48", "For clouds and smoke, where scattering hides what few directions "
+                            "leave; in rooms small bright spots show as soft beams", 48),
+               ('96', "96", "For rooms and thin fog: half as far off as with 48", 96)])
     cascades: IntProperty(
         name="Cascades", update=changed, default=0, min=0, max=3,
         description="Lattices of scattered and reflected light, each within the last and half as "

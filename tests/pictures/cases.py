@@ -107,9 +107,9 @@ CASES = {case.name: case for case in (
     Case('room_smoke', (), 0.10, 1024, method='LPV'),
     Case('cube', (), 0.02, 512, zoom=1.4, method='DOM'),
     Case('cloud', (), 0.03, 512, zoom=1.15, method='DOM'),
-    Case('room', (), 0.10, 2048, method='DOM'),
-    Case('room_smoke', (), 0.10, 1024, method='DOM'),
-    Case('arcade', (), 0.08, 1024, method='DOM'),
+    Case('room', (), 0.06, 2048, method='DOM'),
+    Case('room_smoke', (), 0.09, 1024, method='DOM'),
+    Case('arcade', (), 0.06, 1024, method='DOM'),
     Case('cube', (), 0.03, 256, zoom=1.4, change='isotropic', method='DOM', medium_only=True),
     Case('cube', (), 0.05, 1024, zoom=1.4, change='forward', method='DOM', medium_only=True),
     # White media of this thickness scatter a tenth of their light more often than 64 times.

@@ -231,29 +231,40 @@ bool scattered_parted(gpu_field field, vec3 at)
     return texelFetch(scattered_lattice, texel_of(field, ivec3(at - 0.5), 0), 0).w > 0.0;
 }
 
-// The same as the cells of one of DOM's lattices scatter it, per unit of sigma_s: of the cells on the point's
-// side of surfaces, where these are near.
-vec3 scattered_in(gpu_field field, vec3 p)
+// The same as the cells of one of DOM's lattices scatter it, per unit of sigma_s, where nothing parts them.
+// Beyond the outermost cells' centres it goes on as before them.
+vec3 scattered_all_round(gpu_field field, vec3 at, vec3 last)
 {
-    vec3 at = (p - field.lower.xyz) / field.lower.w;
-    vec3 last = clamp(at, vec3(0.5), vec3(field.dims.xyz) - 0.5);
     vec3 light = scattered_at(field, last);
-    // Beyond the outermost cells' centres it goes on as before them.
-    if (at != last) {
-        vec3 before = scattered_at(field, clamp(2.0 * last - at, vec3(0.5), vec3(field.dims.xyz) - 0.5));
-        light = clamp(2.0 * light - before, vec3(0.0), 2.0 * light);
-    }
-    if (!scattered_parted(field, last))
-        return light;
+    vec3 before = scattered_at(field, clamp(2.0 * last - at, vec3(0.5), vec3(field.dims.xyz) - 0.5));
+    return at == last ? light : clamp(2.0 * light - before, vec3(0.0), 2.0 * light);
+}
+
+// And of the cells on the point's side of surfaces, where some are parted.
+vec3 scattered_beside(gpu_field field, vec3 p)
+{
     cells_between cells = cells_around(field, p);
-    vec4 sum = vec4(0.0);
+    vec4 sum = vec4(texelFetch(scattered_lattice, texel_of(field, cells.home, 0), 0).rgb, 1.0) * 1e-6;
     int corner = 0;
     do {
         ivec3 cell;
         float weight = share_of_cell(cells, field, corner, vec4(0.0, 0.0, 0.0, -1.0), cell);
         sum += weight * vec4(texelFetch(scattered_lattice, texel_of(field, cell, 0), 0).rgb, 1.0);
     } while (++corner < 8);
-    return sum.w > 1e-3 ? sum.rgb / sum.w : light;
+    return sum.rgb / sum.w;
+}
+
+// A loop, so that software need not do both: points that are asked one by one are mostly near surfaces.
+vec3 scattered_in(gpu_field field, vec3 p)
+{
+    vec3 at = (p - field.lower.xyz) / field.lower.w;
+    vec3 last = clamp(at, vec3(0.5), vec3(field.dims.xyz) - 0.5), light;
+    bool parted = scattered_parted(field, last);
+    int way = 0;
+    do
+        light = way == 0 ? scattered_beside(field, p) : scattered_all_round(field, at, last);
+    while (++way < 2 && !parted);
+    return light;
 }
 
 vec3 field_scattered(vec3 p)

@@ -500,11 +500,11 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
         glVertexArrayVertexBuffer(geometry->vertex_array, 0, draw->vertices, 0, VERTEX_BYTES);
         glVertexArrayElementBuffer(geometry->vertex_array, draw->corners);
         if (!bare) {
-        glBindTextureUnit(SLOT_MATERIAL_BASE, draw->base_image);
-        glBindTextureUnit(SLOT_MATERIAL_ROUGHNESS, draw->roughness_image);
-        glBindBufferRange(GL_UNIFORM_BUFFER, SLOT_MATERIAL, geometry->materials.id,
-                          (GLintptr)(draw->material * sizeof(struct gpu_material)),
-                          sizeof(struct gpu_material));
+            glBindTextureUnit(SLOT_MATERIAL_BASE, draw->base_image);
+            glBindTextureUnit(SLOT_MATERIAL_ROUGHNESS, draw->roughness_image);
+            glBindBufferRange(GL_UNIFORM_BUFFER, SLOT_MATERIAL, geometry->materials.id,
+                              (GLintptr)(draw->material * sizeof(struct gpu_material)),
+                              sizeof(struct gpu_material));
         }
         glDrawElementsInstancedBaseInstance(
             GL_TRIANGLES, (GLsizei)draw->corner_count, GL_UNSIGNED_INT,

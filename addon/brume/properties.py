@@ -102,7 +102,8 @@ class BrumeSettings(bpy.types.PropertyGroup):
         items=[('26', "26", "Quick, for a first look: bright spots show as beams", 26),
                ('48', "48", "For clouds and smoke, where scattering hides what few directions "
                             "leave; in rooms small bright spots show as soft beams", 48),
-               ('96', "96", "For rooms and thin fog: half as far off as with 48", 96)])
+               ('96', "96", "For rooms and thin fog, which come out a quarter to a half "
+                            "closer", 96)])
     cascades: IntProperty(
         name="Cascades", update=changed, default=0, min=0, max=3,
         description="Lattices of scattered and reflected light, each within the last and half as "

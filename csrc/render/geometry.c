@@ -13,7 +13,7 @@
 /* m; squares of distances stay finite floats. */
 #define FARTHEST 1e15f
 #define HALF_MAX 65504.0f
-#define VERTEX_BYTES (8 * sizeof(float)) /* position, normal and uv */
+#define VERTEX_BYTES (VERTEX_FLOATS * sizeof(float))
 #define TRIANGLE_BYTES (3 * sizeof(uint32_t)) /* its corners' numbers */
 
 /* --- Caches ------------------------------------------------------------------------------- */

@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define VERTEX_FLOATS 8
 /* How many vertices at a place are compared with a corner there: the latest, lest a fan of flat
  * triangles take a time that grows with its square. */
 #define MOST_COMPARED 8

@@ -9,12 +9,13 @@
 #include <pthread.h>
 
 #define KIND_COUNT 6
+#define VERTEX_FLOATS 8 /* position, normal, uv */
 
 struct mesh_block {
     struct block block;
     char name[64];
     uint32_t triangle_count, vertex_count, slot_count;
-    float *vertices;      /* 8 floats each: position, normal, uv */
+    float *vertices;      /* VERTEX_FLOATS each */
     uint32_t *corners;    /* 3 a triangle, sorted by slot: numbers of vertices */
     uint32_t *slot_first; /* slot_count + 1: first triangle of each slot */
     uint64_t *materials; /* slot_count */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Inputs of the drawing stages: one vertex a corner, one instance an object. What is the instance's comes
-// as attributes: looked up in a buffer, a corner at a time, it made shadow maps take a CPU three times as long.
+// as attributes: from a buffer software reads it number by number, lane by lane, for every corner.
 #include "lib/draw.glsl"
 
 layout(location = 0) in vec3 in_position;

@@ -232,7 +232,8 @@ struct gpu_draw {
                             brightest emission that a unit is */
     vec4 eye;            /* camera position, or the direction it looks along; w: 0 direction. Of a
                             reflective map that looks out of the field's lattice: that way; w: 1 */
-    uvec4 info;          /* x: seed of the alpha test; y: number of a link */
+    uvec4 info;          /* x: seed of the alpha test; y: number of a link; z: 1: once more,
+                            adding what is nearest along it */
 };
 
 /* The lattice stages' block. */

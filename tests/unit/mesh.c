@@ -27,7 +27,7 @@ static const float *corner(const struct mesh_block *mesh, uint32_t triangle, int
 {
     const uint32_t vertex = mesh->corners[3 * triangle + (uint32_t)number];
     assert_true(vertex < mesh->vertex_count);
-    return mesh->vertices + 8 * (size_t)vertex;
+    return mesh->vertices + VERTEX_FLOATS * (size_t)vertex;
 }
 
 static void smooth_and_flat(void **state)

@@ -79,9 +79,10 @@ void main()
         axis = -axis; // both sides of a surface are the same
     float reach = 0.5 * level.lower.w * (abs(axis.x) + abs(axis.y) + abs(axis.z));
     ivec3 cell = cell_at(p + axis * reach, axis);
-    // In a wedge's tip the other wall may be nearer than that. Towards the light nothing is.
+    // In a wedge's tip the other wall may be nearer than that. Towards the light nothing is; but along the
+    // surface, where light grazes it, the cell may be one behind it.
     ivec3 towards_light = cell_at(p + towards * (reach / max(dot(axis, towards), 0.5)), axis);
-    if (is_parted(cell, towards_light))
+    if (dot(cell_centre(level, towards_light) - p, axis) > 0.0 && is_parted(cell, towards_light))
         cell = towards_light;
     if (!in_level(cell))
         return;

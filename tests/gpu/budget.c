@@ -2,11 +2,11 @@
 /* A memory budget is kept at every moment of a render, whatever the settings ask for, with warnings
  * by id and the picture still made; and the bytes of a pixel, a triangle and a cell are what the
  * budget is shared out by. */
-#include "harness.h"
+#include "field.h"
 #include "render/view.h"
+#include "transport/dom.h"
 #include "transport/medium_textures.h"
 
-static const float origin[3];
 static const float down[3] = {0.2f, 0.1f, -1.0f};
 
 static const brume_settings greedy = {.medium_resolution = 256, .lattice_resolution = 160,
@@ -213,6 +213,38 @@ static void bytes_of_pixels_and_cells(void **state)
     brume_scene_destroy(scene);
 }
 
+/* The same of Discrete Ordinates' lattice, while the light in it is found: what one of 24 cells
+ * along its sides takes more than one of 12. */
+static void bytes_of_the_field(void **state)
+{
+    (void)state;
+    static const int sides[2] = {24, 32};
+    brume_scene *scene = full_scene();
+    double told[2], peaks[2];
+    for (int i = 0; i < 2; ++i) {
+        const brume_settings settings = {.method = BRUME_METHOD_DOM,
+                                         .medium_resolution = 8,
+                                         .lattice_resolution = 8,
+                                         .field_resolution = sides[i],
+                                         .ordinates = 26,
+                                         .iterations = 1,
+                                         .shadow_resolution = 32};
+        brume_stats stats;
+        struct field field = field_of(scene, &settings, &stats);
+        const int *dims = dims_of(&field);
+        const double cells = (double)dims[0] * dims[1] * dims[2];
+        const double slice = (sides[i] + 2.0) * (sides[i] + 2.0);
+        told[i] = cells * (DOM_CELL_BYTES + DOM_WORKING_BYTES + 26 * DOM_ORDINATE_BYTES) +
+                  slice * 26 * DOM_SLICE_BYTES;
+        peaks[i] = (double)stats.peak_bytes;
+        assert_int_equal(field.level_count, 1);
+        free(field.texels);
+    }
+    print_message("held: %.3f of what is told\n", (peaks[1] - peaks[0]) / (told[1] - told[0]));
+    assert_close(peaks[1] - peaks[0], told[1] - told[0], 0.02);
+    brume_scene_destroy(scene);
+}
+
 /* 400 lamps of six maps each pass the maps that there are: some cast no shadow, none is lost. */
 static void more_lamps_than_maps(void **state)
 {
@@ -250,6 +282,7 @@ int main(void)
         cmocka_unit_test(images_and_meshes_count),
         cmocka_unit_test(impossible_budgets_are_refused),
         cmocka_unit_test(bytes_of_pixels_and_cells),
+        cmocka_unit_test(bytes_of_the_field),
         cmocka_unit_test(more_lamps_than_maps),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);

@@ -7,6 +7,7 @@
 #include "lib/ordinates.glsl"
 #include "lib/walls.glsl"
 #include "lib/harmonics.glsl"
+#include "lib/lines.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
@@ -16,10 +17,12 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
 };
 
 layout(binding = SLOT_LINKS) uniform usampler3D links;
+layout(binding = SLOT_LINES) uniform usampler3D lines;
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D cell_image[3]; // extinction; absorbed share,
                                                        // mean cosine; surfaces' reflectance
-layout(binding = SLOT_OUTPUT_FIELD, r32ui) writeonly uniform uimage3D cuts_image;
+layout(binding = SLOT_OUTPUT_FIELD, rgba32ui) writeonly uniform uimage3D cuts_image; // links that are cut; how much
+                             // of them is closed, two words; points of the cell parted from its middle
 layout(binding = SLOT_OUTPUT_FIELD + 1, rgba16f) writeonly uniform image3D depths_image; // of cells, by
                                              // what turns light off its way; not below THINNEST
 
@@ -29,6 +32,35 @@ layout(location = 0) uniform float brightest; // emission of a surface
 
 const int POINTS = 6; // along a cell, at most
 
+uint lines_of(ivec3 cell, int number)
+{
+    return texelFetch(lines, lines_texel(cell, number), 0).r;
+}
+
+// How much of a cell's links is closed, as closed_share() wants it: of the lines from points that the cell's
+// middle sees to points that its neighbour's sees. What parts others from these is not in the way, but beside
+// it, unless the link itself is cut: then they are behind what cuts it.
+uvec2 closed_links(ivec3 cell, uint parted)
+{
+    uvec2 closed = uvec2(0u);
+    for (int i = 0; i < 26; ++i) {
+        ivec3 next = i < 13 ? cell + LINKS[i] : cell - LINKS[i - 13];
+        uint there = lines_of(next, LINE_PARTED), cut = lines_of(i < 13 ? cell : next, i % 13);
+        bool blocked = (cut & MIDDLE) != 0u;
+        uint told = POINTS_ACROSS[i % 13] & ~(blocked ? parted & there : parted | there);
+        float share = float(bitCount(told & (cut | parted | there))) / float(bitCount(told));
+        uint thirds = uint(round(3.0 * share));
+        closed |= uvec2(thirds & 1u, thirds >> 1) << i;
+    }
+    return closed;
+}
+
+// Of surfaces so small that no link's middle meets them.
+vec3 line_surface(ivec3 cell, int number)
+{
+    return unpackUnorm4x8(lines_of(cell, number)).rgb;
+}
+
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
@@ -36,7 +68,8 @@ void main()
         return;
     float side = level.lower.w;
     vec3 lower = level.lower.xyz + vec3(cell) * side;
-    medium_mean medium = mean_of_medium(lower + 0.5 * side, side, POINTS);
+    uint parted = lines_of(cell, LINE_PARTED);
+    medium_mean medium = mean_of_medium(lower + 0.5 * side, side, POINTS, parted);
     vec3 extinct = medium.sigma_t, scatter = medium.sigma_s_scaled;
     float g_weight = luminance(medium.sigma_s), g_sum = medium.g * g_weight;
     if (fog_exists()) {
@@ -60,8 +93,10 @@ void main()
     imageStore(cell_image[1], cell, fit(1.0 - albedo, scatter == vec3(0.0) ? EMPTY : g));
     vec3 turns = extinct * (1.0 - albedo * scaled_bands(g).y) * side;
     imageStore(depths_image, cell, vec4(clamp(turns, vec3(THINNEST), vec3(65504.0)), 0.0));
-    imageStore(cell_image[2], cell, vec4(mean_of_walls(cell, 0), 0.0));
-    vec3 emission = mean_of_walls(cell, WALL_EMISSION) * brightest;
-    imageStore(emission_image, cell, vec4(min(emission, vec3(65504.0)), 0.0));
-    imageStore(cuts_image, cell, uvec4(cuts, 0u, 0u, 0u));
+    bool met = walls_met(cell) > 0u;
+    vec3 reflectance = met ? mean_of_walls(cell, 0) : line_surface(cell, LINE_REFLECTANCE);
+    vec3 emission = met ? mean_of_walls(cell, WALL_EMISSION) : line_surface(cell, LINE_EMISSION);
+    imageStore(cell_image[2], cell, vec4(reflectance, 0.0));
+    imageStore(emission_image, cell, vec4(min(emission * brightest, vec3(65504.0)), 0.0));
+    imageStore(cuts_image, cell, uvec4(cuts, closed_links(cell, parted), parted));
 }

@@ -18,6 +18,7 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
 layout(binding = SLOT_CELL_EXTINCT) uniform sampler3D cell_extinct;
 layout(binding = SLOT_CELL_ALBEDO) uniform sampler3D cell_absorbed;
 layout(binding = SLOT_MOMENTS) uniform sampler3D world_moments;
+layout(binding = SLOT_CUTS) uniform usampler3D cell_cuts;
 
 layout(binding = SLOT_OUTPUT, rgba16f) writeonly uniform image3D first_image;
 
@@ -27,7 +28,7 @@ const int POINTS_IN_PART = 3; // that the medium is asked at, along a part of a 
 // What the media scatter in a cube of side `part` around a point, of all lamps' light, and emit.
 void add_point(inout vec3 q[MOMENTS], vec3 p, float part, uint lot)
 {
-    medium_mean medium = mean_of_medium(p, part, POINTS_IN_PART);
+    medium_mean medium = mean_of_medium(p, part, POINTS_IN_PART, 0u);
     vec3 sigma_s = medium.sigma_s, extinct = medium.sigma_t, emission = medium.emission;
     float g = medium.g;
     if (fog_exists() && in_box(p, frame.fog_lower.xyz, frame.fog_upper.xyz)) {
@@ -71,15 +72,20 @@ void main()
     float side = level.lower.w;
     if (extinct != vec3(0.0)) {
         uint start = hash(uint(cell.x) + hash(uint(cell.y) + hash(uint(cell.z))));
-        int points = points_in_cell(POINTS, 4);
+        uint parted = texelFetch(cell_cuts, cell, 0).a;
+        int points = parted == 0u ? points_in_cell(POINTS, 4) : LINES_ALONG;
         float part = side / float(points);
+        float asked = 0.0;
         int i = 0;
         do {
+            if ((parted & third_bit(point_in_cube(i, points))) != 0u)
+                continue; // behind a surface, where light may be another
             vec3 p = point_in_cell(cell, i, points);
             add_point(q, p, part, start + uint(i));
+            asked += 1.0;
         } while (++i < points * points * points);
         // A source in a cell that dims next to nothing would be next to infinite.
-        vec3 per = 1.0 / (float(points * points * points) * max(extinct, vec3(1e-4 / side)));
+        vec3 per = 1.0 / (max(asked, 1.0) * max(extinct, vec3(1e-4 / side)));
         for (int m = 0; m < MOMENTS; ++m)
             q[m] *= per;
         if (stage.offset.x != 0) {

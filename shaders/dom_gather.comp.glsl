@@ -81,6 +81,6 @@ void main()
         vec3 before = texelFetch(moments, moment_texel(cell, m), 0).rgb;
         keep(mixed_texel(cell, m), sums[m], before);
     }
-    if (texelFetch(cell_cuts, cell, 0).r != 0u)
+    if (texelFetch(cell_cuts, cell, 0).gb != uvec2(0u))
         keep(mixed_texel(cell, MIXED - 1), wall_radiance(cell), texelFetch(cell_walls, cell, 0).rgb);
 }

@@ -7,6 +7,7 @@
 // went and what the source gave: nothing is lost, however thick the cell is.
 #version 450 core
 #include "lib/ordinates.glsl"
+#include "lib/cuts.glsl"
 
 layout(local_size_x = GROUP_PIXELS * GROUP_PIXELS) in;
 
@@ -69,7 +70,7 @@ void main()
     vec3 way = turned(axis, direction);
     float long_ = 1.0 / abs(way.x); // the way through a slice, in cells
     ivec3 cell = placed(axis, way.x > 0.0 ? pass.x : dims.x - 1 - pass.x, at);
-    uint cuts = texelFetch(cell_cuts, cell, 0).r;
+    uvec2 closed = texelFetch(cell_cuts, cell, 0).gb;
 
     vec2 aside = abs(way.yz) * long_;
     ivec2 turn = ivec2(sign(way.yz));
@@ -80,9 +81,8 @@ void main()
     float stopped = 0.0;
     for (int i = 0; i < 4; ++i) {
         comes[i] = column(at - turn * aside_of(i), dims, number);
-        bool cut = (cuts & ordinates.list[number].links_in[i]) != 0u;
-        enters += shares[i] * (cut ? wall : comes[i].rgb);
-        stopped += (cuts & ordinates.list[number].links_out[i]) != 0u ? shares[i] : 0.0;
+        enters += shares[i] * mix(comes[i].rgb, wall, closed_share(closed, ordinates.list[number].links_in[i]));
+        stopped += shares[i] * closed_share(closed, ordinates.list[number].links_out[i]);
     }
     // The part of a column that goes aside is its side there, and light that grows is more in it.
     for (int i = 0; i < 2; ++i) {
@@ -102,7 +102,7 @@ void main()
     bool thick = max(depth.r, max(depth.g, depth.b)) > 0.02 && source.w > 0.0;
     vec3 grows = vec3(0.0);
     if (thick)
-        grows = growth(cell, number, direction * long_, source, cuts);
+        grows = growth(cell, number, direction * long_, source, closed.y);
     vec3 leaves = enters * through + source.rgb * gives +
                   grows * (0.5 * (1.0 + through) - gives / max(depth, vec3(1e-3)));
     // Of thin cells to the second order.
@@ -111,9 +111,9 @@ void main()
                     lessThan(depth, vec3(3e-3)));
     // In thin media it does not count how light grows: taken as even it spreads aside, which hides that it
     // goes along few ordinates; in thick ones scattering does that.
-    float counts = cuts == 0u ? clamp(8.0 * max(depth.r, max(depth.g, depth.b)), 0.0, 1.0) : 0.0;
+    float counts = closed == uvec2(0u) ? clamp(8.0 * max(depth.r, max(depth.g, depth.b)), 0.0, 1.0) : 0.0;
     imageStore(slice_image, slice_texel(at, number), fit_along(leaves, 1.0 + counts, cell, number));
     imageStore(mean_image, ordinate_texel(cell, number), fit_along(mean, 0.0, cell, number));
-    if (cuts != 0u && pass.w == 0)
+    if (closed != uvec2(0u) && pass.w == 0)
         imageStore(hits_image, ordinate_texel(cell, number), fit(leaves * stopped, stopped));
 }

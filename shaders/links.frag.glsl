@@ -2,10 +2,12 @@
 // Where surfaces cut the links of the field's lattice, and what the cells at a link's ends see of them: what
 // is nearest. The picture is seen along one of them, sheared so that each pixel's centre is a line through
 // cells' centres: a fragment is a cut, exactly. It is drawn twice: nothing else tells what is nearest of
-// all cuts before the last one is drawn.
+// all cuts before the last one is drawn. With LINES the picture is finer, and all lines that links are
+// made of are asked, too.
+// variants: LINES
 #version 450 core
 #include "lib/material.glsl"
-#include "lib/level.glsl"
+#include "lib/lines.glsl"
 
 in vec3 world_position;
 in vec2 uv;
@@ -38,6 +40,57 @@ uint nearness(float off)
     return (stage.info.y + 1u) << 28 | uint((1.0 - off) * 268435440.0);
 }
 
+#ifdef LINES
+layout(binding = SLOT_OUTPUT_LINES, r32ui) uniform uimage3D lines_image;
+
+// What a line ends at cuts the next one, too: no light slips through a wall between them.
+const float MARGIN = 1e-3;
+
+void cut_line(ivec3 cell, int number, uint points)
+{
+    if (in_links(cell))
+        imageAtomicOr(lines_image, lines_texel(cell, number), points);
+}
+
+// What is seen from a line's end, so far off; the nearest remains.
+void show_line(ivec3 cell, float off, vec3 reflectance, vec3 emission)
+{
+    if (!in_level(cell))
+        return;
+    imageAtomicMax(lines_image, lines_texel(cell, LINE_REFLECTANCE), packUnorm4x8(vec4(reflectance, 1.0 - off)));
+    if (emission != vec3(0.0))
+        imageAtomicMax(lines_image, lines_texel(cell, LINE_EMISSION), packUnorm4x8(vec4(emission, 1.0 - off)));
+}
+
+void cut_lines(vec3 at, ivec3 link, int axis, vec3 reflectance, vec3 emission)
+{
+    int number = int(stage.info.y);
+    for (int i = -1; i <= 1; ++i) {
+        float past = at[axis] - float(i) / float(LINES_ALONG), along = floor(past), off = past - along;
+        vec3 begins = at - off * vec3(link);
+        ivec3 cell = ivec3(round(begins));
+        cell[axis] = int(along);
+        ivec3 point = clamp(ivec3(round(float(LINES_ALONG) * (begins - vec3(cell)))), -1, 1);
+        point[axis] = i;
+        uint bit = point_bit(point);
+        if ((POINTS_ACROSS[number] & bit) == 0u)
+            continue;
+        cut_line(cell, number, bit);
+        if (off < MARGIN)
+            cut_line(cell - link, number, bit);
+        if (off > 1.0 - MARGIN)
+            cut_line(cell + link, number, bit);
+        const float near = 1.0 / float(LINES_ALONG) + MARGIN;
+        if (bit == MIDDLE && off < near)
+            cut_line(cell, LINE_PARTED, point_bit(link));
+        if (bit == MIDDLE && off > 1.0 - near)
+            cut_line(cell + link, LINE_PARTED, point_bit(-link));
+        show_line(cell, off, reflectance, emission);
+        show_line(cell + link, 1.0 - off, reflectance, emission);
+    }
+}
+#endif
+
 void main()
 {
     vec4 base = material_base(uv);
@@ -46,10 +99,19 @@ void main()
     ivec3 link = LINKS[stage.info.y];
     int axis = link.x != 0 ? 0 : (link.y != 0 ? 1 : 2);
     vec3 at = (world_position - level.lower.xyz) / level.lower.w - 0.5 + ASIDE;
-    float along = floor(at[axis]), off = at[axis] - along;
-    ivec3 cell = ivec3(round(at - off * vec3(link)));
-    cell[axis] = int(along);
     bool adds = stage.info.z != 0u;
+    vec3 reflectance = material.diffuse.rgb * base.rgb, emission = material.emission.rgb * stage.clip.w;
+    float along = floor(at[axis]), off = at[axis] - along;
+    vec3 begins = at - off * vec3(link);
+    ivec3 cell = ivec3(round(begins));
+    cell[axis] = int(along);
+#ifdef LINES
+    if (!adds)
+        cut_lines(at, link, axis, reflectance, emission);
+    begins[axis] = along;
+    if (any(greaterThan(abs(begins - vec3(cell)), vec3(0.5 / float(LINES_ALONG)))))
+        return; // not the middle of its lines, which is the link itself
+#endif
     for (int end = 0; end < 2; ++end) {
         ivec3 from = end == 0 ? cell : cell + link;
         if (!in_level(from))
@@ -59,7 +121,7 @@ void main()
         if (!adds)
             imageAtomicMax(nearest_image, texel, near);
         else if (imageLoad(nearest_image, texel).r == near)
-            add_wall(from, material.diffuse.rgb * base.rgb, material.emission.rgb * stage.clip.w);
+            add_wall(from, reflectance, emission);
     }
     if (adds)
         return;

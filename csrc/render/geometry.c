@@ -471,7 +471,8 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
 {
     static const char *const stems[] = {
         [GEOMETRY_GBUFFER] = "gbuffer", [GEOMETRY_SHADOW] = "shadow", [GEOMETRY_TINT] = "tint",
-        [GEOMETRY_LINKS] = "links",     [GEOMETRY_REFLECT] = "reflect"};
+        [GEOMETRY_LINKS] = "links",     [GEOMETRY_REFLECT] = "reflect",
+        [GEOMETRY_LINES] = "links:LINES"};
     const struct program *program, *opaque;
     TRY(program_draw(&gpu->programs, stems[pass], &program));
     TRY(program_draw(&gpu->programs, pass == GEOMETRY_SHADOW ? "shadow:OPAQUE" : stems[pass],

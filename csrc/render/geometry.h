@@ -56,6 +56,7 @@ enum geometry_pass {
     GEOMETRY_TINT = 2, /* multiplies by the colour of what is seen through; writes no depth */
     GEOMETRY_LINKS = 3,   /* tells where surfaces cut links of the field's lattice */
     GEOMETRY_REFLECT = 4, /* positions, normals and reflectances, for reflective shadow maps */
+    GEOMETRY_LINES = 5,   /* as links, and where lines that these are made of are cut */
 };
 
 /* Draws what has all bits of `visibility` with the bound framebuffer. */

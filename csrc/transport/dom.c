@@ -29,13 +29,14 @@ struct dom_work {
     vec4 directions[MOST_ORDINATES], sky[MOST_ORDINATES]; /* the world's radiance along each */
     int across;                                           /* tiles of theirs along z */
     struct buffer ordinates, dots;
-    struct texture sources, means, hits; /* by ordinates */
-    struct texture world_means;          /* the same of the world's own light, for one within */
-    struct texture slices[2];            /* what leaves a slice of cells */
-    bool warm;                           /* whether iterations begin with what was known */
-    struct texture cuts, wall;           /* all links that surfaces cut; these surfaces' radiance */
-    struct texture emission;             /* of surfaces */
-    struct texture depths, missing[3];   /* for diffusion: of cells; the fluence, by steps */
+    struct texture sources, means, hits;    /* by ordinates */
+    struct texture world_means;             /* the same of the world's own light, for one within */
+    struct texture slices[2];               /* what leaves a slice of cells */
+    bool warm;                              /* whether iterations begin with what was known */
+    struct texture cuts;                    /* what surfaces do to links */
+    struct texture wall;                    /* radiance of surfaces */
+    struct texture emission;                /* of surfaces */
+    struct texture depths, missing[3];      /* for diffusion: of cells; the fluence, by steps */
     struct texture first, world, now, next; /* moments: of the first source, of the world's own
                                                light, of what an iteration begins with, and finds */
     struct texture residuals[HISTORY], results[HISTORY]; /* bands 0, 1, surfaces */
@@ -83,9 +84,13 @@ static brume_result make_cells(struct dom_work *work)
     TRY(texture_init(memory, &cells->links, FOR_TRANSPORT, GL_TEXTURE_3D, GL_R32UI,
                      texture_side(dims.x + 2), texture_side(dims.y + 2), texture_side(dims.z + 2),
                      1, "cut links"));
-    TRY(lattice_texture(work, &work->cuts, GL_R32UI, 1, 1, 1, "cells' cut links"));
+    TRY(texture_init(memory, &cells->lines, FOR_TRANSPORT, GL_TEXTURE_3D, GL_R32UI,
+                     texture_side(LINE_SIDE * (dims.x + 2)), texture_side(LINE_SIDE * (dims.y + 2)),
+                     texture_side(dims.z + 2), 1, "links' lines"));
+    TRY(lattice_texture(work, &work->cuts, GL_RGBA32UI, 1, 1, 1, "cells' cut links"));
     TRY(lattice_texture(work, &work->wall, GL_RGBA16F, 1, 1, 1, "surfaces' radiance"));
     TRY(lattice_texture(work, &work->emission, GL_RGBA16F, 1, 1, 1, "surfaces' emission"));
+    TRY(lattice_texture(work, &work->depths, GL_RGBA16F, 1, 1, 1, "cells' depths"));
     return lattice_texture(work, &cells->walls, GL_R32UI, WALL_TEXELS, 1, 1,
                            "surfaces' reflectances");
 }
@@ -170,7 +175,6 @@ static brume_result make_moments(struct dom_work *work)
         clear(&work->residuals[i]);
         clear(&work->results[i]);
     }
-    TRY(lattice_texture(work, &work->depths, GL_RGBA16F, 1, 1, 1, "cells' depths"));
     for (size_t i = 0; i < sizeof work->missing / sizeof *work->missing; ++i)
         TRY(lattice_texture(work, &work->missing[i], GL_RGBA16F, 1, 1, 1, "diffusion"));
     const ivec4 dims = work->cells.field->dims;
@@ -183,12 +187,13 @@ static void finish(struct dom_work *work)
 {
     struct memory *memory = &work->cells.input->gpu->memory;
     struct lpv_work *cells = &work->cells;
-    struct texture *all[] = {
-        &work->sources,    &work->means,       &work->hits,       &work->slices[0],
-        &work->slices[1],  &work->cuts,        &work->wall,       &work->first,
-        &work->world,      &work->now,         &work->next,       &cells->links,
-        &cells->walls,     &work->depths,      &work->missing[0], &work->missing[1],
-        &work->missing[2], &work->world_means, &work->emission,   &work->surroundings};
+    struct texture *all[] = {&work->sources,    &work->means,        &work->hits,
+                             &work->slices[0],  &work->slices[1],    &work->cuts,
+                             &work->wall,       &work->first,        &work->world,
+                             &work->now,        &work->next,         &cells->links,
+                             &cells->walls,     &work->depths,       &work->missing[0],
+                             &work->missing[1], &work->missing[2],   &work->world_means,
+                             &work->emission,   &work->surroundings, &cells->lines};
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         texture_finish(memory, all[i]);
     for (int i = 0; i < HISTORY; ++i) {
@@ -234,8 +239,6 @@ static brume_result prepare(struct dom_work *work)
     struct lpv_work *cells = &work->cells;
     const struct program *program;
     TRY(make_cells(work));
-    TRY(make_ordinates(work));
-    TRY(make_moments(work));
     glBindBufferBase(GL_UNIFORM_BUFFER, SLOT_LEVEL, cells->level.id);
     laps_go(cells->laps, BRUME_FIELD_SURFACES);
     TRY(lpv_cut_links(cells));
@@ -247,9 +250,13 @@ static brume_result prepare(struct dom_work *work)
     image(SLOT_OUTPUT_FIELD, &work->cuts);
     image(SLOT_OUTPUT_FIELD + 1, &work->depths);
     image(SLOT_OUTPUT_FIELD + 2, &work->emission);
+    glBindTextureUnit(SLOT_LINES, cells->lines.id);
     TRY(program_compute(&cells->input->gpu->programs, "dom_cells", &program));
     glProgramUniform1f(program->id, 0, cells->input->geometry->brightest);
     TRY(over_field(work, "dom_cells", (ivec4){0}));
+    texture_finish(&cells->input->gpu->memory, &cells->lines); /* before larger ones are needed */
+    TRY(make_ordinates(work));
+    TRY(make_moments(work));
     TRY(lpv_reflect(cells));
     laps_go(cells->laps, BRUME_FIELD_PREPARE);
     TRY(program_compute(&cells->input->gpu->programs, "dom_ordinates", &program));

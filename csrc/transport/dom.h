@@ -8,7 +8,7 @@
 /* Bytes of a cell: what the view takes light from, and the next run begins with; what is needed
  * while that is found; of this for each ordinate, and where another lattice stands within. */
 #define DOM_CELL_BYTES (FIELD_CELL_BYTES + 8 * MOMENTS + 8 * BAND_2 + 24)
-#define DOM_WORKING_BYTES (32 * MOMENTS + HISTORY * 16 * MIXED + 176)
+#define DOM_WORKING_BYTES (32 * MOMENTS + HISTORY * 16 * MIXED + 188)
 #define DOM_ORDINATE_BYTES 24
 #define DOM_AROUND_BYTES 8
 #define DOM_SLICE_BYTES 16 /* of a slice's cell, for each ordinate */

@@ -37,6 +37,7 @@ struct lpv_work {
     struct texture cells[3];        /* extinction, albedo, reflectance of the surfaces in it */
     struct texture cells_around;    /* of the lattice around it, by the cells beyond its sides */
     struct texture links, walls;    /* links that surfaces cut; sums of their reflectances */
+    struct texture lines;           /* that links are made of, where it is there */
     struct texture reflected[3];    /* what surfaces reflect first, the lattice's layers as tiles */
     int tiles;                      /* of these in a row */
     struct laps *laps;              /* the time of each part, of all lattices */
@@ -60,7 +61,7 @@ brume_result lpv_make_product(struct texture *product, const struct transport_in
 /* The corners of a lattice. */
 void lpv_field_box(const struct gpu_field *field, float lower[3], float upper[3]);
 
-/* Links that surfaces cut, and what these reflect, into work->links and walls. */
+/* Links that surfaces cut, and what these reflect, into work->links, walls and lines. */
 brume_result lpv_cut_links(struct lpv_work *work);
 /* What surfaces reflect of the lights' own light, into work->reflected; and where blockers are
  * fuzzy, the areas of the surfaces that lights see, or that are seen from outside. */

@@ -15,8 +15,8 @@ static const int links[LINKS][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 0
                                     {1, 0, 1},  {1, 0, -1}, {0, 1, 1},  {0, 1, -1}, {1, 1, 1},
                                     {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
 
-/* The view along a link: an affine map, sheared. `size`: its pixels. */
-static mat4 view_along(const struct gpu_field *field, const int link[3], int size[2])
+/* The view along a link: an affine map, sheared. `size`: its pixels, so many to a cell's side. */
+static mat4 view_along(const struct gpu_field *field, const int link[3], int lines, int size[2])
 {
     static const double aside[3] = {(double)ASIDE_X, (double)ASIDE_Y, (double)ASIDE_Z};
     const float *lower = &field->lower.x;
@@ -29,10 +29,11 @@ static mat4 view_along(const struct gpu_field *field, const int link[3], int siz
         origin[i] = -(double)lower[i] * per_m - 0.5 + aside[i];
     for (int row = 0; row < 2; ++row) {
         const int other = (axis + 1 + row) % 3;
-        /* pixel = q[other] - link[other] q[axis], moved to begin with 0 */
-        const int before = link[other] > 0 ? dims[axis] : 0;
-        size[row] = dims[other] + (link[other] ? dims[axis] : 0);
-        const double scale = 2.0 / (double)size[row];
+        /* pixel = q[other] - link[other] q[axis], moved to begin with 1: lines stand around links */
+        const int before = 1 + (link[other] > 0 ? dims[axis] : 0);
+        const int cells = 2 + dims[other] + (link[other] ? dims[axis] : 0);
+        size[row] = lines * cells;
+        const double scale = 2.0 / (double)cells;
         view.m[4 * other + row] = (float)(scale * per_m);
         view.m[4 * axis + row] = (float)(-scale * per_m * (double)link[other]);
         view.m[12 + row] = (float)(scale * (origin[other] - (double)link[other] * origin[axis] +
@@ -50,18 +51,19 @@ static brume_result draw(struct lpv_work *work, GLuint framebuffer)
 {
     const struct transport_input *input = work->input;
     const float brightest = input->geometry->brightest;
+    const bool lines = work->lines.id != 0;
     for (int i = 0; i < 2 * LINKS; ++i) {
         int size[2];
         const int link = i / 2;
         const struct gpu_draw stage = {
-            .clip_from_world = view_along(work->field, links[link], size),
+            .clip_from_world = view_along(work->field, links[link], lines ? LINES_ALONG : 1, size),
             .clip.w = brightest > 0.0f ? 1.0f / brightest : 0.0f,
             .info = {0, (uint32_t)link, (uint32_t)(i % 2), 0}};
         glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_WIDTH, size[0]);
         glNamedFramebufferParameteri(framebuffer, GL_FRAMEBUFFER_DEFAULT_HEIGHT, size[1]);
         glViewport(0, 0, size[0], size[1]);
         TRY(geometry_draw(input->gpu, input->geometry, &stage, BRUME_VISIBLE_SHADOW,
-                          GEOMETRY_LINKS));
+                          lines ? GEOMETRY_LINES : GEOMETRY_LINKS));
         glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     }
     return BRUME_OK;
@@ -85,6 +87,8 @@ brume_result lpv_cut_links(struct lpv_work *work)
     begin_with_nothing(SLOT_OUTPUT_LINKS, &work->links);
     begin_with_nothing(SLOT_OUTPUT_WALLS, &work->walls);
     begin_with_nothing(SLOT_OUTPUT_NEAREST, &nearest);
+    if (work->lines.id)
+        begin_with_nothing(SLOT_OUTPUT_LINES, &work->lines);
     GLuint framebuffer;
     glCreateFramebuffers(1, &framebuffer);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);

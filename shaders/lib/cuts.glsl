@@ -27,3 +27,9 @@ bool is_cut(uint cuts, ivec3 offset)
 {
     return (cuts & link_bit(offset)) != 0u;
 }
+
+// How much of a link is closed: thirds of it, one and two, are bits by numbers of links.
+float closed_share(uvec2 closed, uint link)
+{
+    return ((closed.x & link) != 0u ? 1.0 / 3.0 : 0.0) + ((closed.y & link) != 0u ? 2.0 / 3.0 : 0.0);
+}

@@ -47,6 +47,13 @@ vec3 point_in_cube(int number, int points)
     return (vec3(row.y, layer.y, layer.x) + 0.5) / float(points);
 }
 
+// By thirds along its sides, the part of a cube that a point is in: a bit.
+uint third_bit(vec3 within)
+{
+    ivec3 third = clamp(ivec3(3.0 * within), ivec3(0), ivec3(2));
+    return 1u << (9 * third.z + 3 * third.y + third.x);
+}
+
 struct view_ray
 {
     vec3 origin;

@@ -28,8 +28,9 @@ struct medium_mean
 };
 
 // Asked at points a cell of the medium apart, or nearly: texels are then asked for as they weigh, so that
-// thick media are as thick in cells that their sides pass through.
-medium_mean mean_of_medium(vec3 p, float side, int most)
+// thick media are as thick in cells that their sides pass through. Not where the cube's thirds, numbered
+// as in point_in_cube(), are hidden; in its middle none is.
+medium_mean mean_of_medium(vec3 p, float side, int most, uint hidden)
 {
     medium_mean m = medium_mean(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
     vec3 reach = vec3(0.5 * side);
@@ -39,9 +40,12 @@ medium_mean mean_of_medium(vec3 p, float side, int most)
         return m;
     int points = clamp(int(ceil(side / frame.medium_lower.w)), 1, most);
     int all_ = points * points * points, i = 0;
-    float weights = 0.0;
+    float weights = 0.0, asked = 0.0;
     do {
-        vec3 q = p + (point_in_cube(i, points) - 0.5) * side;
+        vec3 within = point_in_cube(i, points), q = p + (within - 0.5) * side;
+        if ((hidden & third_bit(within)) != 0u)
+            continue;
+        asked += 1.0;
         if (!in_box(q, frame.medium_lower.xyz, frame.medium_upper.xyz))
             continue;
         vec3 uvw = medium_coordinate(q);
@@ -55,7 +59,7 @@ medium_mean mean_of_medium(vec3 p, float side, int most)
         if (frame.medium_upper.w != 0.0)
             m.emission += textureLod(medium_emission, uvw, 0.0).rgb;
     } while (++i < all_);
-    float share = 1.0 / float(all_);
+    float share = 1.0 / max(asked, 1.0);
     m.sigma_s *= share;
     m.sigma_s_scaled *= share;
     m.sigma_t *= share;

@@ -86,7 +86,8 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_ANGULAR 24      /* by ordinates: the source; in the end what cells' means are, */
 #define SLOT_HITS 25         /* and what meets surfaces */
 #define SLOT_SLICE 26        /* radiance that leaves the slice of cells before */
-#define SLOT_CUTS 30
+#define SLOT_LINES 25        /* lines that links are made of */
+#define SLOT_CUTS 30         /* what surfaces do to a cell's links: dom_cells says */
 #define SLOT_MOMENTS 34      /* and one more that a stage's shader names */
 #define SLOT_CELL_EMISSION 26 /* of the surfaces in a cell */
 #define SLOT_CELL_WALLS 31   /* radiance of the surfaces in a cell */
@@ -102,6 +103,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_OUTPUT_LINKS 0
 #define SLOT_OUTPUT_WALLS 1
 #define SLOT_OUTPUT_NEAREST 2
+#define SLOT_OUTPUT_LINES 3
 #define SLOT_OUTPUT_FIELD 3  /* and two more */
 
 /* Layers of what is marched at half the resolution: colours, and in w */
@@ -130,6 +132,16 @@ typedef struct mat4 { float m[16]; } mat4;
 #define WALL_COUNT 6
 #define WALL_CUTS 7
 #define WALL_UNIT 1048575.0
+
+/* A link is made of lines from points around the middle of its cell, a third of a cell apart, to those
+ * of its neighbour. Texels of a cell in their picture: bits, by points, for each of 13 links of the lines
+ * that surfaces cut, and of the points that are parted from the cell's middle; and of the surface nearest
+ * to a line's end its reflectance and what it emits, as a share of the brightest material's. */
+#define LINES_ALONG 3
+#define LINE_SIDE 4 /* texels of a cell, along x and y */
+#define LINE_PARTED 13
+#define LINE_REFLECTANCE 14
+#define LINE_EMISSION 15
 
 /* Cells along a brick's side: the unit of empty-space skipping. */
 #define BRICK_CELLS 8

@@ -23,7 +23,7 @@ PRESETS = {
               "half_resolution_volumes": True, "shadow_resolution": 256,
               "light_samples": 4, "world_samples": 32},
     'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64,
-                "field_resolution": 32, "ordinates": '96', "step": 3.0,
+                "field_resolution": 40, "ordinates": '96', "step": 3.0,
                 "half_resolution_volumes": True, "shadow_resolution": 512, "light_samples": 8,
                 "world_samples": 128},
     'FINAL': {"samples": 64, "medium_resolution": 192, "lattice_resolution": 96,

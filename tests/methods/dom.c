@@ -234,7 +234,7 @@ static void few_iterations(void **state)
             add_sun(scene, 3, down);
         }
         struct field early = field_of(scene, &settings, &stats);
-        settings.iterations = 40;
+        settings.iterations = 20;
         struct field late = field_of(scene, &settings, NULL);
         const double off = fields_apart(&early, &late, 1);
         print_message("sigma_s %g g %g, walls %.1f: %u iterations, change %.5f, %.3f %% off\n",

@@ -40,6 +40,18 @@ uint nearness(float off)
     return (stage.info.y + 1u) << 28 | uint((1.0 - off) * 268435440.0);
 }
 
+// The line that goes along a link through a point, in cells, from where it is so far past a cell's middle: the
+// cell and the place that it begins at, and how far along the point is.
+ivec3 line_through(vec3 at, ivec3 link, int axis, float past, out vec3 begins, out float off)
+{
+    float from = at[axis] - past, along = floor(from);
+    off = from - along;
+    begins = at - off * vec3(link);
+    ivec3 cell = ivec3(round(begins));
+    cell[axis] = int(along);
+    return cell;
+}
+
 #ifdef LINES
 layout(binding = SLOT_OUTPUT_LINES, r32ui) uniform uimage3D lines_image;
 
@@ -66,13 +78,12 @@ void cut_lines(vec3 at, ivec3 link, int axis, vec3 reflectance, vec3 emission)
 {
     int number = int(stage.info.y);
     for (int i = -1; i <= 1; ++i) {
-        float past = at[axis] - float(i) / float(LINES_ALONG), along = floor(past), off = past - along;
-        vec3 begins = at - off * vec3(link);
-        ivec3 cell = ivec3(round(begins));
-        cell[axis] = int(along);
+        vec3 begins;
+        float off;
+        ivec3 cell = line_through(at, link, axis, float(i) / float(LINES_ALONG), begins, off);
         ivec3 point = clamp(ivec3(round(float(LINES_ALONG) * (begins - vec3(cell)))), -1, 1);
         point[axis] = i;
-        uint bit = point_bit(point);
+        uint bit = offset_bit(point);
         if ((POINTS_ACROSS[number] & bit) == 0u)
             continue;
         cut_line(cell, number, bit);
@@ -82,9 +93,9 @@ void cut_lines(vec3 at, ivec3 link, int axis, vec3 reflectance, vec3 emission)
             cut_line(cell + link, number, bit);
         const float near = 1.0 / float(LINES_ALONG) + MARGIN;
         if (bit == MIDDLE && off < near)
-            cut_line(cell, LINE_PARTED, point_bit(link));
+            cut_line(cell, LINE_PARTED, offset_bit(link));
         if (bit == MIDDLE && off > 1.0 - near)
-            cut_line(cell + link, LINE_PARTED, point_bit(-link));
+            cut_line(cell + link, LINE_PARTED, offset_bit(-link));
         show_line(cell, off, reflectance, emission);
         show_line(cell + link, 1.0 - off, reflectance, emission);
     }
@@ -101,14 +112,12 @@ void main()
     vec3 at = (world_position - level.lower.xyz) / level.lower.w - 0.5 + ASIDE;
     bool adds = stage.info.z != 0u;
     vec3 reflectance = material.diffuse.rgb * base.rgb, emission = material.emission.rgb * stage.clip.w;
-    float along = floor(at[axis]), off = at[axis] - along;
-    vec3 begins = at - off * vec3(link);
-    ivec3 cell = ivec3(round(begins));
-    cell[axis] = int(along);
+    vec3 begins;
+    float off;
+    ivec3 cell = line_through(at, link, axis, 0.0, begins, off);
 #ifdef LINES
     if (!adds)
         cut_lines(at, link, axis, reflectance, emission);
-    begins[axis] = along;
     if (any(greaterThan(abs(begins - vec3(cell)), vec3(0.5 / float(LINES_ALONG)))))
         return; // not the middle of its lines, which is the link itself
 #endif

@@ -14,7 +14,7 @@ const uint LINKS_BETWEEN[8] = uint[](
 
 uint link_number(ivec3 offset)
 {
-    return NUMBERS[9 * offset.z + 3 * offset.y + offset.x + 13];
+    return NUMBERS[offset_number(offset)];
 }
 
 uint link_bit(ivec3 offset)

@@ -47,11 +47,21 @@ vec3 point_in_cube(int number, int points)
     return (vec3(row.y, layer.y, layer.x) + 0.5) / float(points);
 }
 
+// The number of an offset, -1 to 1 along each axis, x first; of none: 13.
+int offset_number(ivec3 offset)
+{
+    return 9 * offset.z + 3 * offset.y + offset.x + 13;
+}
+
+uint offset_bit(ivec3 offset)
+{
+    return 1u << offset_number(offset);
+}
+
 // By thirds along its sides, the part of a cube that a point is in: a bit.
 uint third_bit(vec3 within)
 {
-    ivec3 third = clamp(ivec3(3.0 * within), ivec3(0), ivec3(2));
-    return 1u << (9 * third.z + 3 * third.y + third.x);
+    return offset_bit(clamp(ivec3(3.0 * within), ivec3(0), ivec3(2)) - 1);
 }
 
 struct view_ray

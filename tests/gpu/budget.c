@@ -213,8 +213,8 @@ static void bytes_of_pixels_and_cells(void **state)
     brume_scene_destroy(scene);
 }
 
-/* The same of Discrete Ordinates' lattice, while the light in it is found: what one of 24 cells
- * along its sides takes more than one of 12. */
+/* The same of Discrete Ordinates' lattice, while the light in it is found: what one of 32 cells
+ * along its sides takes more than one of 24. In smaller ones reflective maps weigh more. */
 static void bytes_of_the_field(void **state)
 {
     (void)state;

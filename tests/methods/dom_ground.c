@@ -4,7 +4,6 @@
 #include "dom.h"
 
 #define REFLECTANCE 0.3f
-#define THIN 0.002f /* what scatters once scatters no more, and dims nothing */
 
 static void add_ground(brume_scene *scene, float height)
 {
@@ -12,24 +11,6 @@ static void add_ground(brume_scene *scene, float height)
     const float h = 200.0f;
     const float square[12] = {-h, -h, height, h, -h, height, h, h, height, -h, h, height};
     add_matt(scene, 1, "ground", REFLECTANCE, identity, square, 4, triangles, 2);
-}
-
-/* Radiance that a cube of thin fog, two metres wide, scatters to an eye at its side of light that
- * does not come from lamps, by its scattering coefficient and width. */
-static double scattered(brume_scene *scene, uint32_t pass)
-{
-    static const struct coefficients thin = {.sigma_s = {THIN, THIN, THIN}};
-    static const float sideways[3] = {1, 0, 0};
-    const brume_settings settings = settings_for(16);
-    add_fog_cube(scene, 2, origin, 1.0f, &thin);
-    brume_view view = orthographic_view(origin, sideways, 0.2f, 50.0f, 8);
-    view.passes = 1u << pass;
-    brume_job *job = render(scene, &settings, &view);
-    float *pixels = read_pass(job, &view, pass);
-    const double found = middle(pixels, &view, 4, 0);
-    free(pixels);
-    brume_job_release(job);
-    return found / (2.0 * (double)THIN);
 }
 
 /* Below the cube, and at its lower side. */
@@ -82,14 +63,6 @@ static void sunlit_ground(void **state)
     (void)state;
     const double cosine = 1.0 / sqrt(1.34);
     check(in_the_sun, (double)REFLECTANCE * cosine / (2.0 * PI));
-}
-
-static brume_scene *under_a_sky(void)
-{
-    brume_scene *scene = empty();
-    const brume_world world = {.color = {1, 1, 1}};
-    assert_ok(brume_scene_set_world(scene, &world));
-    return scene;
 }
 
 /* A sky of radiance 1 above, and below what the ground reflects of it. */

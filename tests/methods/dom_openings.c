@@ -4,9 +4,9 @@
  * box is dark. */
 #include "dom.h"
 
-#define THIN 0.002f /* what scatters once scatters no more, and dims nothing */
 #define MOST 64
 #define RAYS 200000
+#define EYE 0.0125 /* how high the middle pixel of scattered() looks through the cube */
 
 /* Strips along y, of black board so thick, that cover a part of a plane through the fog. */
 struct strips {
@@ -39,12 +39,12 @@ static double by_rays(const struct strips *strips)
     uint64_t lots = 88172645463325252u;
     int seen = 0;
     for (int i = 0; i < RAYS; ++i) {
-        const double from[3] = {2.0 * lot(&lots) - 1.0, 0.1 * (lot(&lots) - 0.5), 0.0};
+        const double from[3] = {2.0 * lot(&lots) - 1.0, 0.1 * (lot(&lots) - 0.5), EYE};
         double d[3] = {0, 0, 1}, turns[2] = {0};
         scatter(d, 0.0, &lots);
         bool beside = d[2] > 0.0;
         for (int k = 0; k < 2 && !beside; ++k) {
-            const double way = (strips->low + k * strips->thick) / d[2];
+            const double way = (strips->low + k * strips->thick - from[2]) / d[2];
             const double x = from[0] + way * d[0], y = from[1] + way * d[1];
             turns[k] = (x - strips->begin) / strips->period;
             beside = fabs(x) > 1.0 || fabs(y) > 1.0;
@@ -58,21 +58,9 @@ static double by_rays(const struct strips *strips)
 
 static double by_brume(const struct strips *strips)
 {
-    static const struct coefficients thin = {.sigma_s = {THIN, THIN, THIN}};
-    static const brume_world world = {.color = {1, 1, 1}};
-    static const float sideways[3] = {1, 0, 0};
-    const brume_settings settings = settings_for(16);
-    brume_scene *scene = empty();
-    assert_ok(brume_scene_set_world(scene, &world));
+    brume_scene *scene = under_a_sky();
     add_strips(scene, strips);
-    add_fog_cube(scene, 2, origin, 1.0f, &thin);
-    brume_view view = orthographic_view(origin, sideways, 0.1f, 50.0f, 8);
-    view.passes = 1u << BRUME_PASS_VOLUME_INDIRECT;
-    brume_job *job = render(scene, &settings, &view);
-    float *pixels = read_pass(job, &view, BRUME_PASS_VOLUME_INDIRECT);
-    const double found = middle(pixels, &view, 4, 0) / (2.0 * (double)THIN);
-    free(pixels);
-    brume_job_release(job);
+    const double found = scattered(scene, BRUME_PASS_VOLUME_INDIRECT);
     brume_scene_destroy(scene);
     return found;
 }

@@ -13,6 +13,7 @@ layout(local_size_x = GROUP_PIXELS, local_size_y = GROUP_PIXELS) in;
 layout(binding = SLOT_GBUFFER_NORMAL) uniform sampler2D gbuffer_normal;
 layout(binding = SLOT_GBUFFER_DIFFUSE) uniform sampler2D gbuffer_diffuse;
 layout(binding = SLOT_GBUFFER_SPECULAR) uniform sampler2D gbuffer_specular;
+#include "lib/nearby.glsl"
 
 layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image2D surface_image;
 
@@ -125,7 +126,7 @@ vec3 world_specular(surface s, vec3 p, ivec2 pixel, float within)
 }
 
 // Light that was scattered or reflected before. What mirrors show of it is as soft as the lattice.
-vec3 field_surface(surface s, vec3 p)
+vec3 field_surface(surface s, vec3 p, vec3 near)
 {
     vec3 before = s.normal * (0.5 * frame.fields[0].lower.w);
     float left;
@@ -133,7 +134,7 @@ vec3 field_surface(surface s, vec3 p)
     if (left <= 0.0)
         return vec3(0.0);
     field_light light = field_at(q, s.normal, s.view, frame.field.x - 1);
-    return left * (s.diffuse * field_irradiance(light, s.normal) / PI +
+    return left * (s.diffuse * near * field_irradiance(light, s.normal) / PI +
                    s.specular * field_radiance(light, reflect(-s.view, s.normal)));
 }
 
@@ -162,8 +163,13 @@ void main()
             float within = pixel_random(pixel, 8u);
             radiance += world_diffuse(s, p, pixel, within) + world_specular(s, p, pixel, within);
         }
-        if (field_exists())
-            radiance += field_surface(s, p);
+        if (field_exists()) {
+            // LPV's light is as published.
+            vec3 near = vec3(1.0);
+            if (frame.field.y != 0)
+                near = nearby_lit(nearby_visible(s, ray, normal_depth.w, pixel, field_cell(p)), s.diffuse);
+            radiance += field_surface(s, p, near);
+        }
     }
     imageStore(surface_image, pixel, vec4(radiance, 0.0));
 }

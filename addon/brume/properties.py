@@ -22,7 +22,7 @@ PRESETS = {
               "field_resolution": 16, "ordinates": '26', "step": 4.0,
               "half_resolution_volumes": True, "shadow_resolution": 256,
               "light_samples": 4, "world_samples": 32},
-    'PREVIEW': {"samples": 16, "medium_resolution": 128, "lattice_resolution": 64,
+    'PREVIEW': {"samples": 12, "medium_resolution": 128, "lattice_resolution": 64,
                 "field_resolution": 40, "ordinates": '96', "step": 3.0,
                 "half_resolution_volumes": True, "shadow_resolution": 512, "light_samples": 8,
                 "world_samples": 128},

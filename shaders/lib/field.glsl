@@ -169,6 +169,19 @@ float share_of(gpu_field field, vec3 p)
     return clamp(min(inside.x, min(inside.y, inside.z)) / (float(FIELD_GIVES_WAY) * field.lower.w), 0.0, 1.0);
 }
 
+// Length of the cells that tell the light at a point.
+float field_cell(vec3 p)
+{
+    float left = 1.0, length_ = 0.0;
+    int number = max(frame.field.x - 1, 0);
+    do {
+        float share = number > 0 ? left * share_of(frame.fields[number], p) : left;
+        length_ += share * frame.fields[number].lower.w;
+        left -= share;
+    } while (--number >= 0);
+    return length_;
+}
+
 float home_green(gpu_field field, cells_between cells)
 {
     return texelFetch(field_lattice, texel_of(field, cells.home, 1), 0).x;

@@ -3,7 +3,7 @@
 // nearer to it than the lattice tells apart, such as the other wall of a corner or what lies on a floor.
 // How much of the sky over the surface those hide the horizons tell that the pixels around show, in two
 // planes through the eye (Jimenez et al., "Practical Real-Time Strategies for Accurate Indirect Occlusion",
-// SIGGRAPH 2016 courses, eq. 7).
+// SIGGRAPH 2016 courses; the closed form of the inner integral).
 
 const float NEARBY_REACH = 1.5; // cells: from there on the lattice knows
 const int NEARBY_STEPS = 8;     // along each half of a plane

@@ -189,13 +189,53 @@ struct way {
     float along, u, v; /* that light goes through a slice, in cells */
     float shares[4];   /* of the cells that it comes from */
     ptrdiff_t from[4]; /* where they are in the slice before */
+    float aside[2];    /* half of what a column has aside and straight on, by axes */
     float depth;       /* of a unit of extinction */
 };
+
+/* What leaves a slice: colours; whether there is a cell, and how far it counts how light grows; and
+ * how much that does from one column to the next, along both axes. A column's neighbours may be a
+ * row before the first or after the last. */
+enum slice_plane { SLICE_THERE = 3, SLICE_COUNTS, SLICE_RISES, SLICE_PLANES = SLICE_RISES + 6 };
+
+static size_t slice_room(const struct plain *plain)
+{
+    const size_t wide = wide_side(plain);
+    return SLICE_PLANES * wide * wide + 2 * wide;
+}
+
+/* How much light grows, in a row of a slice. */
+static void rise_row(int n, ptrdiff_t step, const float *restrict light,
+                     const float *restrict there, const float *restrict counts,
+                     float *restrict rises)
+{
+    for (int u = 0; u < n; ++u) {
+        const ptrdiff_t low = u - step, high = u + step;
+        const float own = light[u], most = 2.0f * fabsf(own);
+        const float slope = (light[high] - own) * there[high] + (own - light[low]) * there[low];
+        const float rise = counts[u] * slope / fmaxf(there[low] + there[high], 1.0f);
+        rises[u] = fminf(fmaxf(rise, -most), most);
+    }
+}
+
+static void rise(const struct plain *plain, const struct way *way, float *slice)
+{
+    const size_t wide = wide_side(plain), plane = wide * wide;
+    for (size_t i = 0; i < 2; ++i)
+        for (size_t c = 0; c < 3; ++c)
+            for (size_t row = 1; row + 1 < wide; ++row) {
+                float *light = slice + row * wide + 1;
+                rise_row(plain->cells, -way->from[1 + i], light + c * plane,
+                         light + SLICE_THERE * plane, light + SLICE_COUNTS * plane,
+                         light + (SLICE_RISES + 3 * i + c) * plane);
+            }
+}
 
 /* A colour of a row of cells. */
 static void sweep_row(int n, size_t wide, const struct way *way, const float *restrict extinct,
                       const float *restrict medium, const float *restrict source,
                       const float *restrict thick, int any_thick, const float *restrict before,
+                      const float *restrict rises_u, const float *restrict rises_v,
                       float *restrict after, float *restrict means)
 {
     const ptrdiff_t row = (ptrdiff_t)wide, slice = row * row;
@@ -220,8 +260,10 @@ static void sweep_row(int n, size_t wide, const struct way *way, const float *re
         memset(grows, 0, sizeof(float) * (size_t)n);
     }
     for (int u = 0; u < n; ++u) {
-        const float enters = way->shares[0] * b0[u] + way->shares[1] * b1[u] +
-                             way->shares[2] * b2[u] + way->shares[3] * b3[u];
+        float enters = way->shares[0] * b0[u] + way->shares[1] * b1[u] + way->shares[2] * b2[u] +
+                       way->shares[3] * b3[u];
+        enters += way->aside[0] * (rises_u[u + way->from[1]] - rises_u[u]) +
+                  way->aside[1] * (rises_v[u + way->from[2]] - rises_v[u]);
         const float depth = extinct[u] * way->depth, through = expf(-depth);
         const float gives = depth < 1e-3f ? depth * (1.0f - 0.5f * depth) : 1.0f - through;
         const float leaves = enters * through + source[u] * gives +
@@ -245,6 +287,7 @@ static struct way way_along(const struct plain *plain, int axis, int k)
                         .v = v * size,
                         .shares = {(1.0f - a) * (1.0f - b), a * (1.0f - b), (1.0f - a) * b, a * b},
                         .from = {0, -to_u, -to_v, -to_u - to_v},
+                        .aside = {0.5f * a * (1.0f - a), 0.5f * b * (1.0f - b)},
                         .depth = plain->side * size};
 }
 
@@ -253,30 +296,36 @@ static void sweep(struct plain *plain, int axis, int k, float *slices)
 {
     const int n = plain->cells;
     const size_t n2 = (size_t)n * (size_t)n, n3 = n2 * (size_t)n, wide = wide_side(plain);
-    const size_t room = 3 * wide * wide;
+    const size_t room = slice_room(plain), plane = wide * wide;
     const struct way way = way_along(plain, axis, k);
     memset(slices, 0, 2 * room * sizeof *slices); /* nothing comes from outside */
     for (int slice = 0; slice < n; ++slice) {
         const size_t along = (size_t)(way.along > 0.0f ? slice : n - 1 - slice);
-        const float *before = slices + (slice % 2 ? room : 0);
-        float *after = slices + (slice % 2 ? 0 : room);
+        float *before = slices + (slice % 2 ? room : 0) + wide;
+        float *after = slices + (slice % 2 ? 0 : room) + wide;
+        rise(plain, &way, before);
         for (size_t row = 0; row < (size_t)n; ++row) {
             const size_t here = along * n2 + row * (size_t)n;
-            const size_t flat = (row + 1) * wide + 1, place = (along + 1) * wide * wide + flat;
+            const size_t flat = (row + 1) * wide + 1, place = (along + 1) * plane + flat;
             const float *medium = plain->medium[axis] + place;
             const float *extinct = plain->extinct[axis] + here;
+            float *there = after + SLICE_THERE * plane + flat;
+            float *counts = after + SLICE_COUNTS * plane + flat;
             float thick[MOST_CELLS], any = 0.0f;
             for (int u = 0; u < n; ++u) {
                 const float most =
                     fmaxf(extinct[u], fmaxf(extinct[n3 + (size_t)u], extinct[2 * n3 + (size_t)u]));
                 thick[u] = most * way.depth > 0.02f ? medium[u] : 0.0f;
                 any += thick[u];
+                there[u] = 1.0f;
+                counts[u] = fminf(8.0f * most * way.depth, 1.0f);
             }
             for (size_t c = 0; c < 3; ++c)
                 sweep_row(n, wide, &way, extinct + c * n3, medium,
                           plain->sources + (3 * (size_t)k + c) * wide_cells(plain) + place, thick,
-                          any > 0.0f, before + c * wide * wide + flat,
-                          after + c * wide * wide + flat,
+                          any > 0.0f, before + c * plane + flat,
+                          before + (SLICE_RISES + c) * plane + flat,
+                          before + (SLICE_RISES + 3 + c) * plane + flat, after + c * plane + flat,
                           plain->means + (3 * (size_t)k + c) * n3 + here);
         }
     }
@@ -334,7 +383,7 @@ void plain_iterate(struct plain *plain)
     plain->spent_ms[PLAIN_SOURCE] += lap(&since);
 #pragma omp parallel
     {
-        float *slices = malloc(6 * wide_side(plain) * wide_side(plain) * sizeof *slices);
+        float *slices = malloc(2 * slice_room(plain) * sizeof *slices);
         if (!slices)
             abort();
 #pragma omp for schedule(dynamic)

@@ -17,6 +17,7 @@
  * what may be: rounding is all that is left. */
 #define STALLED 4
 #define NEARLY 10.0
+#define STEPS 32 /* of diffusion, at most */
 
 struct dom_work {
     struct lpv_work cells;         /* the lattice: what it is filled with, and its surfaces */
@@ -380,13 +381,16 @@ static void bind_diffusion(const struct dom_work *work, const struct texture *mi
 }
 
 /* Adds what the newest result has yet to find where light diffuses, found in as many steps as the
- * lattice is long: with Chebyshev's weights for the modes that fit into it these leave a tenth. */
+ * lattice is long: with Chebyshev's weights for the modes that fit into it these leave a tenth. Of
+ * lattices longer than STEPS longer modes are left to the iterations: thick media take one or two
+ * more of these then, but with 64 cells steps would be more than half of each. */
 static brume_result diffuse(struct dom_work *work)
 {
     const struct program *program;
     const int newest = work->slots[work->kept - 1];
-    const int most = dom_longest_side(&work->cells.field->dims);
-    /* Eigenvalues: of the longest mode that fits into the lattice, and of the shortest. */
+    const int side = dom_longest_side(&work->cells.field->dims);
+    const int most = side < STEPS ? side : STEPS;
+    /* Eigenvalues: of the longest mode that is looked for, and of the shortest. */
     const double least = 4.0 / ((double)most * most), greatest = 2.0;
     const double middle = 0.5 * (greatest + least), half = 0.5 * (greatest - least);
     double weight = half / middle, inertia = 0.0, forward = 1.0 / middle;

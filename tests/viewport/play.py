@@ -72,8 +72,10 @@ def show(theme, results, names):
         bpy.ops.wm.quit_blender()
     except Exception:
         said = traceback.format_exc()
+        if launch.is_read_only(said):  # no fault of ours: it is played again, and not told
+            leave(launch.FROZEN)
         print(said, flush=True)
-        leave(launch.FROZEN if launch.is_read_only(said) else 1)
+        leave(1)
 
 
 def leave(status):

@@ -66,7 +66,7 @@ def test_scenario(played, theme, name):
 def test_blender_ends_well(played, theme):
     run = played[theme]
     assert run.status == 0, run.said[-4000:]
-    assert not run.wrong
+    assert not run.wrong, run.said[-4000:]
 
 
 @pytest.mark.parametrize("after", QUIT_AFTER_S if SLOW else QUIT_AFTER_S[1:3])
@@ -74,7 +74,7 @@ def test_quits_at_any_moment(after):
     run = launch.play("quitting", ["quit_at_work"], BRUME_QUIT_AFTER=str(after))
     assert run.results["quit_at_work"]["error"] is None
     assert run.status == 0, run.said[-4000:]
-    assert not run.wrong
+    assert not run.wrong, run.said[-4000:]
 
 
 def test_a_missing_library_is_said(tmp_path):

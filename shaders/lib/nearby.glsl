@@ -38,7 +38,7 @@ float horizon(pixels_around around, vec2 way, vec3 view, float least)
         float square = dot(to, to);
         // Less the farther off: the lattice knows the more of it.
         float counts = max(1.0 - square / (around.reach * around.reach), 0.0);
-        float height = mix(least, dot(to, view) * inversesqrt(max(square, 1e-20)), counts);
+        float height = min(mix(least, dot(to, view) * inversesqrt(max(square, 1e-20)), counts), 1.0);
         if (depth > NO_DEPTH && height > highest) {
             highest = height;
             where = other;

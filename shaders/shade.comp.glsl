@@ -167,7 +167,7 @@ void main()
             // LPV's light is as published.
             vec3 near = vec3(1.0);
             if (frame.field.y != 0)
-                near = nearby_lit(nearby_visible(s, ray, normal_depth.w, pixel, field_cell(p)), s.diffuse);
+                near = nearby_lit(nearby_visible(s, p, normal_depth.w, pixel, field_cell(p)), s.diffuse);
             radiance += field_surface(s, p, near);
         }
     }

@@ -56,13 +56,14 @@ float lit_within(float angle, float tilt)
 }
 
 // Share of the light, alike from everywhere, that comes to a surface past what is nearby.
-float nearby_visible(surface s, view_ray ray, float depth, ivec2 pixel, float cell)
+float nearby_visible(surface s, vec3 p, float depth, ivec2 pixel, float cell)
 {
     vec3 width = frame.ray_origin_x.xyz + depth * frame.ray_direction_x.xyz; // of half a picture
     vec3 height = frame.ray_origin_y.xyz + depth * frame.ray_direction_y.xyz;
+    vec3 right = normalize(width), up = normalize(height);
     pixels_around around;
     around.pixel = pixel;
-    around.p = ray.origin + ray.direction * (depth * ray.stretch);
+    around.p = p;
     around.reach = NEARBY_REACH * cell;
     around.wide = around.reach * 0.5 * float(frame.size.x) / max(length(width), 1e-20);
     around.wide = min(around.wide, 0.25 * float(frame.size.x));
@@ -71,7 +72,7 @@ float nearby_visible(surface s, view_ray ray, float depth, ivec2 pixel, float ce
     int plane = 0;
     do {
         vec2 way = plane == 0 ? vec2(cos(turn), sin(turn)) : vec2(-sin(turn), cos(turn));
-        vec3 along = normalize(width) * way.x + normalize(height) * way.y;
+        vec3 along = right * way.x + up * way.y;
         along = normalize(along - s.view * dot(along, s.view));
         vec3 across = cross(along, s.view);
         vec3 normal = s.normal - across * dot(s.normal, across); // in the plane

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Ordinates with the cube's symmetry. Beside the polynomials that a degree asks for, those of 48
- * and 96 integrate |x| over the sphere, so that what falls onto a face of the lattice's is right:
- * with the points of highest degree it is 2 % too much, and a slab that absorbs nothing loses 2 %
- * of the light. */
+/* Ordinates that the cube's rotations turn into one another. Beside the polynomials that a degree
+ * asks for, those of 48 and 96 integrate |x| over the sphere, so that what falls onto a face of the
+ * lattice's is right: with the points of highest degree it is 2 % too much, and a slab that absorbs
+ * nothing loses 2 % of the light. They are not their own mirror images: those that are stand in
+ * clusters about the axes and leave gaps elsewhere. docs/methods/dom.md has the figures. */
 #include "transport/dom.h"
 
 #include <math.h>
 
-/* Points whose coordinates have these sizes, in any order and with any signs. */
+/* A point whose images by the 24 rotations all belong to the set. */
 struct orbit {
-    double a, b, c, weight; /* of a point; all together 1 */
+    double x, y, z, weight; /* of a point; all together 1 */
 };
 
 static const struct orbit orbits_26[] = {
@@ -18,13 +19,14 @@ static const struct orbit orbits_26[] = {
     {0.57735026918962576, 0.57735026918962576, 0.57735026918962576, 9.0 / 280.0},
 };
 static const struct orbit orbits_48[] = {
-    {0.684348909528637, 0.684348909528637, 0.0, 0.028288887514493},
-    {0.131460761015857, 0.131460761015857, 0.0, 0.013377779152174},
+    {0.708009589314440, 0.638947329489903, 0.300780204761748, 0.020918138446224},
+    {0.933655832675592, 0.352184302283536, -0.065215054518923, 0.020748528220443},
 };
 static const struct orbit orbits_96[] = {
-    {0.456598131002521, 0.456598131002521, 0.0, 0.010804157088350},
-    {0.066479892373643, 0.066479892373643, 0.0, 0.006377491765044},
-    {0.164615292543278, 0.509660111627193, 0.0, 0.012242508906636},
+    {0.754398525598018, 0.627334980518857, -0.193219271277329, 0.009859328544795},
+    {0.886479303606403, 0.461831566965659, 0.029428694017087, 0.009836395204998},
+    {0.968634112603732, 0.183065168572492, 0.168033032335626, 0.009361808509311},
+    {0.768978739879804, 0.483996188634798, 0.417635471433950, 0.012609134407563},
 };
 
 static int major(const double v[3])
@@ -36,21 +38,23 @@ static int major(const double v[3])
 /* Adds those of the orbit whose major axis it is. */
 static int add(const struct orbit *orbit, int axis, vec4 *out)
 {
-    static const int orders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2},
-                                     {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
-    const double sizes[3] = {orbit->a, orbit->b, orbit->c};
+    static const int orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1},
+                                     {2, 1, 0}, {1, 0, 2}}; /* odd ones from the fourth on */
+    const double point[3] = {orbit->x, orbit->y, orbit->z};
     int count = 0;
     for (int order = 0; order < 6; ++order) {
         for (int signs = 0; signs < 8; ++signs) {
+            const int turned = (signs & 1) + (signs >> 1 & 1) + (signs >> 2) + (order >= 3);
             double v[3];
             for (int i = 0; i < 3; ++i)
-                v[i] = sizes[orders[order][i]] * (signs >> i & 1 ? -1.0 : 1.0);
-            bool known = major(v) != axis;
-            for (int i = 0; i < count && !known; ++i)
-                known = fabs((double)out[i].x - v[0]) + fabs((double)out[i].y - v[1]) +
-                            fabs((double)out[i].z - v[2]) <
-                        1e-5;
-            if (!known)
+                v[i] = point[orders[order][i]] * (signs >> i & 1 ? -1.0 : 1.0);
+            /* An odd number of swaps and signs makes a mirror image. */
+            bool skip = turned % 2 != 0 || major(v) != axis;
+            for (int i = 0; i < count && !skip; ++i)
+                skip = fabs((double)out[i].x - v[0]) + fabs((double)out[i].y - v[1]) +
+                           fabs((double)out[i].z - v[2]) <
+                       1e-5;
+            if (!skip)
                 out[count++] = (vec4){(float)v[0], (float)v[1], (float)v[2],
                                       (float)(4.0 * M_PI * orbit->weight)};
         }
@@ -61,16 +65,12 @@ static int add(const struct orbit *orbit, int axis, vec4 *out)
 void dom_quadrature(int count, vec4 directions[MOST_ORDINATES], int axes[3])
 {
     const struct orbit *orbits = count == 26 ? orbits_26 : (count == 48 ? orbits_48 : orbits_96);
-    const int orbit_count = count == 48 ? 2 : 3;
+    const int orbit_count = count == 26 ? 3 : count / 24;
     int all = 0;
     for (int axis = 0; axis < 3; ++axis) {
         const int begin = all;
-        for (int i = 0; i < orbit_count; ++i) {
-            struct orbit orbit = orbits[i];
-            if (count != 26) /* on the sphere */
-                orbit.c = sqrt(1.0 - orbit.a * orbit.a - orbit.b * orbit.b);
-            all += add(&orbit, axis, directions + all);
-        }
+        for (int i = 0; i < orbit_count; ++i)
+            all += add(&orbits[i], axis, directions + all);
         axes[axis] = all - begin;
     }
 }

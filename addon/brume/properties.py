@@ -19,7 +19,7 @@ METHODS = [
 
 PRESETS = {
     'DRAFT': {"samples": 4, "medium_resolution": 64, "lattice_resolution": 32,
-              "field_resolution": 16, "ordinates": '26', "step": 4.0,
+              "field_resolution": 16, "ordinates": '48', "step": 4.0,
               "half_resolution_volumes": True, "shadow_resolution": 256,
               "light_samples": 4, "world_samples": 32},
     'PREVIEW': {"samples": 12, "medium_resolution": 128, "lattice_resolution": 64,
@@ -102,8 +102,7 @@ class BrumeSettings(bpy.types.PropertyGroup):
         items=[('26', "26", "Quick, for a first look: bright spots show as beams", 26),
                ('48', "48", "For clouds and smoke, where scattering hides what few directions "
                             "leave; in rooms small bright spots show as soft beams", 48),
-               ('96', "96", "For rooms and thin fog, which come out a quarter to a half "
-                            "closer", 96)])
+               ('96', "96", "For rooms and thin fog, which come out up to a fifth closer", 96)])
     cascades: IntProperty(
         name="Cascades", update=changed, default=0, min=0, max=3,
         description="Lattices of scattered and reflected light, each within the last and half as "

@@ -34,7 +34,7 @@ static void quadratures(void **state)
         double apart;
     } cases[] = {{26, 7, {0.1, 0.1, 0.1}, 35.0},
                  {48, 9, {1e-6, 0.01, 0.02}, 29.0},
-                 {96, 11, {1e-6, 1e-6, 1e-6}, 17.0}};
+                 {96, 11, {1e-6, 1e-6, 1e-6}, 15.0}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
         const int count = cases[i].count;
         vec4 list[MOST_ORDINATES];
@@ -240,7 +240,7 @@ static void fine_cube(void **state)
     for (size_t i = 0; i < sizeof gs / sizeof *gs; ++i) {
         const struct beam truth = trace(4.0, (double)gs[i]);
         const struct cube_errors off = compare(gs[i], &settings, &truth);
-        assert_true(off.worst < 0.02);
+        assert_true(off.worst < 0.03);
         assert_true(off.fluence < 0.01);
         assert_true(fabs(off.out[0]) < 0.01);
         assert_true(fabs(off.out[1]) < (gs[i] < 0.9f ? 0.01 : 0.03));

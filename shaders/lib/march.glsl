@@ -143,8 +143,8 @@ lamp_ray lamp_along(uint number, view_ray ray, ivec2 pixel)
 }
 
 // What reaches the eye of what a step scatters. Where a strong forward peak counts as not scattered, the
-// light in the peak itself (sharp) is seen as far as it is scattered no more, be it forwards: light in the
-// peak that was scattered twice and more is what the lesser depth towards the lamp adds.
+// light in the peak itself (sharp) is seen as far as it is scattered no more, be it forwards: what it was
+// scattered before is in the lesser depth towards the lamp.
 struct march_reach
 {
     vec3 soft;
@@ -153,7 +153,18 @@ struct march_reach
 #endif
 };
 
-// What a lamp adds in a step from t0 on that is seen at t; what comes from behind it has less reach.
+#ifdef DOM
+// How often light has been scattered by the forward peak on a way of such a depth through a medium such as is
+// here, in the mean of the colours.
+float times_forward(medium_step m, vec3 depth)
+{
+    vec3 times = forward_share(m.g) * m.sigma_s / max(m.sigma_t, vec3(1e-12));
+    return dot(depth * times, vec3(1.0 / 3.0));
+}
+#endif
+
+// What a lamp adds in a step from t0 on that is seen at t; what comes from behind it has less reach. Of the
+// peak's lobes below 0 a step may have less than nothing; a ray has not.
 vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, float t0, float t, float dt,
                inout march_reach reach)
 {
@@ -173,15 +184,16 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, float t0, float t, fl
     if (intensity != vec3(0.0)) {
         if (!lamp.sun)
             intensity *= mean_inverse_square(t0 - lamp.along, t0 + dt - lamp.along, lamp.h);
-        vec3 here = m.sigma_s * intensity * light_transmittance(lamp.light, p, towards, distance);
-        float cosine = dot(towards, ray.direction), phase = phase_hg(cosine, m.g);
+        float cosine = dot(towards, ray.direction);
+        vec3 depth = light_depth(lamp.light, p, towards, distance);
+        vec3 here = m.sigma_s * intensity * exp(-depth);
 #ifdef DOM
-        // Its lobes below 0 are no light: with what is behind them they could outweigh the peak.
-        float soft = max(phase_truncated(cosine, m.g), 0.0);
+        float soft = phase_soft(cosine, m.g);
+        float peak = phase_peak(cosine, m.g, times_forward(m, depth));
         sum = here * (reach.soft * step_weight(m.sigma_t, through, dt) * soft +
-                      reach.sharp * step_weight(sharp_t, sharp_through, dt) * (phase - soft));
+                      reach.sharp * step_weight(sharp_t, sharp_through, dt) * peak);
 #else
-        sum = here * (reach.soft * step_weight(m.sigma_t, through, dt) * phase);
+        sum = here * (reach.soft * step_weight(m.sigma_t, through, dt) * phase_hg(cosine, m.g));
 #endif
     }
     reach.soft *= through;
@@ -219,7 +231,7 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
             sum += lamp_step(lamp, ray, m, t0, t, dt, reach);
         k += skipped;
     } while (++k < end);
-    return sum * lamp.light.factors.z;
+    return max(sum, vec3(0.0)) * lamp.light.factors.z;
 }
 
 // Where a lattice whose cells are longer than steps is asked for so many of these, the first of them at t: in
@@ -313,7 +325,7 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
     uint i = 0u;
 #ifdef LAMPS
     if (frame.paths.x != 0)
-        state.direct += lamp_sum * lamp.light.factors.z;
+        state.direct += max(lamp_sum, vec3(0.0)) * lamp.light.factors.z;
     ++i;
 #endif
     if (first < end && frame.paths.x != 0 && i < frame.counts.x) do

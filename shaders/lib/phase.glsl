@@ -15,10 +15,26 @@ float forward_share(float g)
     return g * g * g * g;
 }
 
-// What bands 0 to 3 show of it without that, per unit of sigma_s.
-float phase_truncated(float cosine, float g)
+// What bands 0 to 3 show of it without that, per unit of sigma_s. Lobes below 0 are no light.
+float phase_soft(float cosine, float g)
 {
     float f = forward_share(g), x2 = cosine * cosine;
-    return ((1.0 - f) + 3.0 * (g - f) * cosine + 2.5 * (g * g - f) * (3.0 * x2 - 1.0) +
-            3.5 * (g * g * g - f) * cosine * (5.0 * x2 - 3.0)) / (4.0 * 3.14159265358979);
+    float bands = (1.0 - f) + 3.0 * (g - f) * cosine + 2.5 * (g * g - f) * (3.0 * x2 - 1.0) +
+                  3.5 * (g * g * g - f) * cosine * (5.0 * x2 - 3.0);
+    return max(bands, 0.0) / (4.0 * 3.14159265358979);
+}
+
+// The rest, the forward peak, of light that the peak has scattered `times` times before, in the mean. Its
+// moments are 1 up to the fourth, then g^(l - 4), per unit of f = g^4; scattered by it n times light has those
+// to the power n, as of g^n. It has been never, once, twice with the chances of Poisson: never apart, and for
+// all the others the g that has their mean fifth moment.
+float phase_peak(float cosine, float g, float times)
+{
+    float never = exp(-times);
+    float part = times > 1e-3 ? (exp(-times * (1.0 - g)) - never) / (1.0 - never) : g;
+    float least = 0.2 / max(abs(g), 0.2); // with less 1 / part^4 is noise
+    part = part < 0.0 ? min(part, -least) : max(part, least);
+    float wide = g * part;
+    return never * (phase_hg(cosine, g) - phase_soft(cosine, g)) +
+           (1.0 - never) / forward_share(part) * (phase_hg(cosine, wide) - phase_soft(cosine, wide));
 }

@@ -224,10 +224,69 @@ static void finer_slabs(void **state)
     }
 }
 
+/* --- Around a beam -------------------------------------------------------------------------- */
+
+#define RINGS 4
+static const double rings[RINGS + 1] = {0.0, 0.15, 0.3, 0.6, 1.0}; /* from the beam, radians */
+
+/* What a beam's light that a slab without end has scattered leaves it by, of 1: Monte Carlo. */
+static void trace_rings(double g, double tau, double powers[RINGS])
+{
+    enum { PHOTONS = 1000000 };
+    uint64_t state = 88172645463325252u;
+    memset(powers, 0, RINGS * sizeof *powers);
+    for (int i = 0; i < PHOTONS; ++i) {
+        double depth = 0.0, d[3] = {0, 0, 1};
+        for (int hits = 0; depth >= 0.0; ++hits) {
+            depth -= log(lot(&state)) / tau * d[2];
+            if (depth > 1.0) {
+                const double tilt = acos(fmin(d[2], 1.0));
+                for (int k = 0; k < RINGS && hits; ++k)
+                    powers[k] += tilt >= rings[k] && tilt < rings[k + 1] ? 1.0 / PHOTONS : 0.0;
+                break;
+            }
+            scatter(d, g, &state);
+        }
+    }
+}
+
+/* What a forward peak scatters once and again stays close around the beam, less and less. */
+static void around_a_beam(void **state)
+{
+    (void)state;
+    static const double one[3] = {1, 1, 1};
+    static const float bottom[3] = {0.11f, 0.07f, -0.5f};
+    static const struct slab cases[] = {{.g = 0.9, .tau = 4.0}, {.g = 0.8, .tau = 4.0}};
+    const struct cut cut = {4.0, 16, 48};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        brume_settings settings = settings_for((int)(cut.wide * cut.across));
+        settings.medium_resolution = settings.lattice_resolution = (int)(cut.wide * 32.0);
+        brume_scene *scene = piece_of(&cases[i], cut.wide, one, BEAM);
+        double truth[RINGS];
+        trace_rings(cases[i].g, cases[i].tau, truth);
+        print_message("beam, g %.1f tau %g, from it:", cases[i].g, cases[i].tau);
+        for (int k = 0; k < RINGS; ++k) {
+            double power[3] = {0.0};
+            for (int n = 0; n < ANGLES; ++n) {
+                const double wide = rings[k + 1] - rings[k], tilt = rings[k] + wide * gauss[n][0];
+                const float out[3] = {(float)sin(tilt), 0.0f, (float)-cos(tilt)};
+                add_sent(scene, &settings, bottom, out,
+                         2.0 * PI * wide * gauss[n][1] * sin(tilt) * cos(tilt), power);
+            }
+            print_message(" %.2f to %.2f %+.1f %%", rings[k], rings[k + 1],
+                          100.0 * (power[0] / truth[k] - 1.0));
+            assert_close(power[0], truth[k], 0.05);
+        }
+        print_message("\n");
+        brume_scene_destroy(scene);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(some_slabs),
+        cmocka_unit_test(around_a_beam),
     };
     const struct CMUnitTest long_tests[] = {
         cmocka_unit_test(all_slabs),

@@ -169,7 +169,7 @@ class SceneQuality:
             settings.light_samples = _halved(settings.light_samples, level, 1)
             settings.world_samples = _halved(settings.world_samples, level, _FEWEST_DIRECTIONS)
             settings.cascades = max(settings.cascades - level, 1)
-            settings.ordinates = min(settings.ordinates, 48)  # fewer light rooms otherwise
+            settings.ordinates = min(settings.ordinates, 48)  # with 26 rooms are brighter
             settings.converged = _ROUGHLY_CONVERGED
             if settings.iterations:
                 settings.iterations = _halved(settings.iterations, level, 1)

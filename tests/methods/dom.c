@@ -222,8 +222,7 @@ static void cube(void **state)
         assert_true(off.worst < 0.04);
         assert_true(off.fluence < 0.02);
         assert_true(fabs(off.out[0]) < 0.01);
-        /* Light of a strong peak counts as straight until it leaves, also what left by the sides.
-         */
+        /* A peak's light counts as straight until it leaves, also what left by the sides. */
         assert_true(fabs(off.out[1]) < (gs[i] < 0.9f ? 0.01 : 0.03));
         assert_true(fabs(off.out[2]) < 0.02); /* four sides */
     }

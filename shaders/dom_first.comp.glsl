@@ -50,7 +50,7 @@ void add_point(inout vec3 q[MOMENTS], vec3 p, float part, uint lot)
             light_path path = path_into(light, s, i, paths, p, part, lot);
             if (path.intensity == vec3(0.0))
                 continue;
-            vec3 depth = light_depth(light, path.p, path.towards, path.distance);
+            vec3 depth = light_depth(light, path.p, path.towards, path.distance).rgb;
             vec3 scattered = path.intensity * mean_transmittance(depth, extinct, path, part) * sigma_s;
             float y[MOMENTS];
             harmonics(-path.towards, y);

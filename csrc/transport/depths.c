@@ -9,6 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Of what is scattered: a peak of less has no light that shows (g below 0.5). */
+#define SLIGHT_SHARE 0.06f
+
 uint32_t depths_samples(const struct gpu_light *light, float cell)
 {
     int extended;
@@ -134,6 +137,23 @@ static brume_result bind_sources(const struct transport_input *input, struct buf
     return BRUME_OK;
 }
 
+/* Where a forward peak is scaled away: what of its light is at the nodes, beside the depths that
+ * the lamps' tiles have now. The first of the sources that are bound. */
+static brume_result find_astray(struct opv_work *run, struct texture *tau, uint32_t count)
+{
+    const struct transport_input *input = run->input;
+    const struct program *program;
+    if (input->medium->forward < SLIGHT_SHARE)
+        return BRUME_OK;
+    TRY(program_compute(&input->gpu->programs, "dom_astray", &program));
+    glBindImageTexture(SLOT_OUTPUT, tau->id, 0, GL_TRUE, 0, GL_READ_WRITE, GL_RGBA16F);
+    glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+    for (uint32_t i = 0; i < count; ++i)
+        TRY(opv_slabs(run, program, (struct gpu_lattice_pass){.offset = {(int)i}},
+                      &input->frame->lattice_dims, 1.0f, 0.0f));
+    return BRUME_OK;
+}
+
 static brume_result find(struct opv_work *run)
 {
     static brume_result (*const ways[BRUME_DEPTHS_COUNT])(struct opv_work *) = {
@@ -189,6 +209,7 @@ static brume_result find_extended(struct opv_work *run, struct texture *tau, str
     opv_bind_image(tau);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     program_dispatch(merge, dims.x, dims.y, dims.z);
+    TRY(find_astray(run, tau, 1));
     /* The next lamp's samples go where this one's are read. */
     glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     return BRUME_OK;
@@ -228,6 +249,8 @@ brume_result depths_run(struct transport *transport, const struct transport_inpu
     }
     if (result == BRUME_OK && points)
         result = find(&run);
+    if (result == BRUME_OK && points)
+        result = find_astray(&run, &transport->tau, points);
     buffer_finish(memory, &run.block);
     buffer_finish(memory, &run.groups);
     buffer_finish(memory, &buffer);

@@ -112,23 +112,29 @@ float medium_forward_share(float g)
     return g * g * g * g;
 }
 
-static void scale(struct medium_lattice *lattice)
+/* Returns the largest share. */
+static float scale(struct medium_lattice *lattice)
 {
+    float largest = 0.0f;
     const size_t cells =
         (size_t)lattice->dims[0] * (size_t)lattice->dims[1] * (size_t)lattice->dims[2];
     for (size_t cell = 0; cell < cells; ++cell) {
         const float *scatter = lattice->scatter + 4 * cell;
         float *extinct = lattice->extinct + 4 * cell;
-        for (int c = 0; c < 3; ++c)
-            extinct[c] = fmaxf(extinct[c] - medium_forward_share(scatter[3]) * scatter[c], 0.0f);
+        const float share = medium_forward_share(scatter[3]);
+        for (int c = 0; c < 3; ++c) {
+            if (scatter[c] > 0.0f)
+                largest = fmaxf(largest, share);
+            extinct[c] = fmaxf(extinct[c] - share * scatter[c], 0.0f);
+        }
     }
+    return largest;
 }
 
 brume_result medium_textures_upload(struct gpu *gpu, struct medium_textures *textures,
                                     struct medium_lattice *lattice, bool scaled)
 {
-    if (scaled)
-        scale(lattice);
+    textures->forward = scaled ? scale(lattice) : 0.0f;
     fit_halves(lattice);
     memcpy(textures->dims, lattice->dims, sizeof textures->dims);
     memcpy(textures->lower, lattice->lower, sizeof textures->lower);

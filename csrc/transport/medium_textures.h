@@ -13,6 +13,7 @@ struct medium_textures {
     int32_t dims[3]; /* 0 without media */
     float lower[3], upper[3], cell;
     int emits;
+    float forward; /* the largest share that is scaled away */
 };
 
 /* Bytes of a cell on the GPU: scatter and extinction, and emission where there is one, as halves,

@@ -60,8 +60,7 @@ vec3 bsdf_specular(surface s, vec3 light)
 vec3 bsdf_sample(surface s, vec2 lot, out vec3 light, out float density)
 {
     float alpha2 = bsdf_alpha2(s), alpha = sqrt(alpha2);
-    vec3 t = normalize(abs(s.normal.z) < 0.9 ? cross(s.normal, vec3(0.0, 0.0, 1.0))
-                                             : cross(s.normal, vec3(1.0, 0.0, 0.0)));
+    vec3 t = across(s.normal);
     vec3 b = cross(s.normal, t);
     vec3 view = vec3(dot(s.view, t), dot(s.view, b), max(dot(s.view, s.normal), 1e-4));
     vec3 v = normalize(vec3(alpha * view.xy, view.z));

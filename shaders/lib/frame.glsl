@@ -96,6 +96,12 @@ vec2 ray_box(vec3 origin, vec3 direction, vec3 lower, vec3 upper)
     return vec2(max(max(near.x, near.y), near.z), min(min(far.x, far.y), far.z));
 }
 
+// A unit vector across another.
+vec3 across(vec3 v)
+{
+    return normalize(abs(v.z) < 0.9 ? cross(v, vec3(0.0, 0.0, 1.0)) : cross(v, vec3(1.0, 0.0, 0.0)));
+}
+
 bool in_box(vec3 p, vec3 lower, vec3 upper)
 {
     return all(greaterThanEqual(p, lower)) && all(lessThanEqual(p, upper));

@@ -185,11 +185,11 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, float t0, float t, fl
         if (!lamp.sun)
             intensity *= mean_inverse_square(t0 - lamp.along, t0 + dt - lamp.along, lamp.h);
         float cosine = dot(towards, ray.direction);
-        vec3 depth = light_depth(lamp.light, p, towards, distance);
-        vec3 here = m.sigma_s * intensity * exp(-depth);
+        vec4 depth = light_depth(lamp.light, p, towards, distance);
+        vec3 here = m.sigma_s * intensity * exp(-depth.rgb);
 #ifdef DOM
         float soft = phase_soft(cosine, m.g);
-        float peak = phase_peak(cosine, m.g, times_forward(m, depth));
+        float peak = phase_peak(cosine, m.g, times_forward(m, depth.rgb), depth.a);
         sum = here * (reach.soft * step_weight(m.sigma_t, through, dt) * soft +
                       reach.sharp * step_weight(sharp_t, sharp_through, dt) * peak);
 #else

@@ -216,7 +216,7 @@ def lpv_page(lines):
 PART_NAMES = {'surfaces': 'links that surfaces cut', 'media': 'media of cells',
               'reflected': 'injection of reflected light',
               'scattered': 'injection of light scattered once', 'blockers': 'injection of blockers',
-              'aggregate': 'aggregation of blockers', 'prepare': 'blocking factors',
+              'aggregate': 'aggregation of input', 'prepare': 'blocking factors',
               'iterations': 'iterations', 'copy': 'copy'}
 
 

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The light that propagation begins with: of every cell, what its medium scatters of the lights' own
-// light, and what its surfaces reflect of it. Gathered by the cell rather than strewn along the
-// lights' rays, so that many rays through one cell cost no more than one.
+// What the media of every cell scatter of the lights' own light: its power and flux. Gathered by the cell
+// rather than strewn along the lights' rays, so that many rays through one cell cost no more than one.
 // variants: SKY
 #version 450 core
 #include "lib/transmittance.glsl"
 #include "lib/shadow.glsl"
 #include "lib/sky.glsl"
-#include "lib/flow.glsl"
 #include "lib/level.glsl"
 #include "lib/spread.glsl"
 
@@ -15,14 +13,10 @@ layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GR
 
 layout(std140, binding = SLOT_STAGE) uniform stage_block
 {
-    gpu_lattice_pass stage; // offset.x: 0 leaves the media out; y: tiles in a row of the surfaces'
+    gpu_lattice_pass stage;
 };
 
-layout(binding = SLOT_REFLECTED) uniform sampler2D reflected[3];
-
 layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D flow_image[3];
-
-#include "lib/power.glsl"
 
 const int POINTS = 64; // along the lattice
 
@@ -65,36 +59,21 @@ void add_scattered(inout vec4 flow[3], vec3 p, float part, uint lot)
 #endif
 }
 
-// All that a cell begins with.
-void begin(ivec3 cell)
-{
-    float side = level.lower.w;
-    ivec2 texel = tiled_texel(cell, level.dims.xyz, stage.offset.y);
-    vec4 flow[3];
-    for (int c = 0; c < 3; ++c)
-        flow[c] = texelFetch(reflected[c], texel, 0);
-    if (stage.offset.x != 0) {
-        uint start = hash(uint(cell_number(cell)));
-        int points = points_in_cell(POINTS, 4);
-        float part = side / float(points);
-        int i = 0;
-        do {
-            // No lots: what is turned by a right angle is lit alike.
-            vec3 p = point_in_cell(cell, i, points);
-            add_scattered(flow, p, part, start + uint(i));
-        } while (++i < points * points * points);
-    }
-    vec3 power;
-    for (int c = 0; c < 3; ++c) {
-        imageStore(flow_image[c], cell, lobe_of(flow[c]));
-        power[c] = max(flow[c].x, 0.0);
-    }
-    tell_power(cell, power);
-}
-
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, stage.slab.z);
-    if (in_level(cell) && cell.z < stage.slab.w)
-        begin(cell);
+    if (!in_level(cell) || cell.z >= stage.slab.w)
+        return;
+    vec4 flow[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
+    uint start = hash(uint(cell_number(cell)));
+    int points = points_in_cell(POINTS, 4);
+    float part = level.lower.w / float(points);
+    int i = 0;
+    do {
+        // No lots: what is turned by a right angle is lit alike.
+        vec3 p = point_in_cell(cell, i, points);
+        add_scattered(flow, p, part, start + uint(i));
+    } while (++i < points * points * points);
+    for (int c = 0; c < 3; ++c)
+        imageStore(flow_image[c], cell, flow[c]);
 }

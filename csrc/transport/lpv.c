@@ -141,20 +141,39 @@ static void bind_level(const struct lpv_work *work)
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_POWERS, work->powers.id);
 }
 
-static brume_result begin(struct lpv_work *work)
+static void clear(const struct texture textures[3])
 {
     static const float nothing[4];
+    for (int c = 0; c < 3; ++c)
+        glClearTexImage(textures[c].id, 0, GL_RGBA, GL_FLOAT, nothing);
+}
+
+/* What media scatter, into the textures that the first iteration fills anew. */
+static brume_result scatter(struct lpv_work *work)
+{
     laps_go(work->laps, BRUME_FIELD_SCATTERED);
+    if (with_media(work)) {
+        const bool sky = work->input->frame->sky_dims.w != 0;
+        bind_images(SLOT_OUTPUT, work->flow[1], GL_WRITE_ONLY, GL_RGBA32F);
+        TRY(over_field(work, sky ? "lpv_scatter:SKY" : "lpv_scatter", (ivec4){0}));
+        glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    } else {
+        clear(work->flow[1]);
+    }
+    return BRUME_OK;
+}
+
+static brume_result begin(struct lpv_work *work)
+{
+    laps_go(work->laps, BRUME_FIELD_AGGREGATE);
+    bind_textures(SLOT_FLOW, work->flow[1]);
     bind_textures(SLOT_REFLECTED, work->reflected);
     bind_images(SLOT_OUTPUT, work->flow[0], GL_WRITE_ONLY, GL_RGBA32F);
-    const bool sky = work->input->frame->sky_dims.w != 0;
-    TRY(over_field(work, sky ? "lpv_scatter:SKY" : "lpv_scatter",
-                   (ivec4){with_media(work), work->tiles, 0, 0}));
-    laps_go(work->laps, BRUME_FIELD_PREPARE); /* a look at it and empty sums inject nothing */
+    TRY(over_field(work, "lpv_aggregate", (ivec4){work->tiles, 0, 0, 0}));
+    laps_go(work->laps, BRUME_FIELD_PREPARE);
     if (!work->around)
         TRY(in_flight(work, &work->input->stats->power_begun));
-    for (int c = 0; c < 3; ++c)
-        glClearTexImage(work->sums[c].id, 0, GL_RGBA, GL_FLOAT, nothing);
+    clear(work->sums);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     return BRUME_OK;
 }
@@ -297,6 +316,7 @@ static brume_result prepare(struct lpv_work *work)
     laps_go(work->laps, BRUME_FIELD_PREPARE);
     if (lpv_is_fuzzy(work))
         TRY(lpv_fuzzy_prepare(work));
+    TRY(scatter(work));
     TRY(begin(work));
     return work->around ? look_around(work) : BRUME_OK;
 }

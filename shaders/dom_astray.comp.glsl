@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light that a forward peak has scattered counts as straight, as it is in the depths towards the lamps; but it
-// comes from beside, and from where nothing scatters comes none. Of the light at a node that the peak has
-// scattered once or more, this is what is there, by what would be there if the medium were the same all around:
-// by the scattering along ways that are as far beside as such light comes from, over that on the straight one.
-// It goes beside the depth, into alpha.
+// In the depths towards the lamps light that a forward peak has scattered counts as straight. But it comes from
+// beside the straight way, and from where nothing scatters comes none: it has left the medium. Of what is
+// counted at a node as scattered by the peak, once or more, this is the share that is there: what scatters along
+// ways as far beside as such light comes from, over what scatters along the straight one. Kept in alpha.
 #version 450 core
 #include "lib/depth.glsl"
 

@@ -14,7 +14,8 @@
 
 /* What the view takes light from. */
 struct transport {
-    struct texture tau;    /* optical depth to each light over the length of the way, a tile a light */
+    struct texture tau;    /* optical depth to each light over the length of the way, a tile a light;
+                              alpha: of light that a forward peak scatters what is there */
     struct texture sky[3]; /* the world's light, spherical harmonics a colour */
     struct texture field;  /* light scattered or reflected before, as lpv_finish leaves it */
     /* DOM: moments of the light that media scatter, what cells scatter of it to the eye, in the mean

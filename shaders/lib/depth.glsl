@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The lattice of optical depths, as the stages that fill it see it. It holds the depth of the way to
 // the light over that way's length in the medium's box: the mean extinction, which changes little
-// from node to node and is the same everywhere in a homogeneous medium.
+// from node to node and is the same everywhere in a homogeneous medium. Alpha is dom_astray's, 1 without it.
 #include "lib/medium.glsl"
 
 layout(std430, binding = SLOT_DEPTH_SOURCES) readonly buffer sources_block

@@ -132,10 +132,10 @@ def merged(points):
 
 # --- The plot
 
-ENGINES = {  # series: name, colour, the frames that are its points
-    'single scattering (OPV)': ('#7f7f7f', ('OPV',)), 'LPV': ('#2ca02c', ('LPV',)),
-    'DOM: Draft, Preview, Final': ('#d62728', tuple(f'DOM_{preset}' for preset in PRESETS)),
-    'EEVEE': ('#9467bd', ('EEVEE',))}
+ENGINES = {  # series: name, colour, the frames that are its points and what is beside these
+    'single scattering (OPV)': ('#7f7f7f', {'OPV': ''}), 'LPV': ('#2ca02c', {'LPV': ''}),
+    'DOM': ('#d62728', {f'DOM_{preset}': preset.capitalize() for preset in PRESETS}),
+    'EEVEE': ('#9467bd', {'EEVEE': ''})}
 
 
 def panel(title, found, key):
@@ -148,10 +148,12 @@ def panel(title, found, key):
                           [(point['wall_s'], point[key]) for point in found['cycles']],
                           [(t0 + t1 * n, float(np.sqrt(fitted[key] / n))) for n in counts],
                           tuple(str(point['samples']) for point in found['cycles']))]
-    series += [plot.Series(name, color, [(frames[frame]['wall_s'], max(frames[frame][key], 1e-4))
-                                         for frame in wanted])
-               for name, (color, every) in ENGINES.items()
-               if (wanted := [frame for frame in every if frame in frames])]
+    for name, (color, labels) in ENGINES.items():
+        if wanted := [frame for frame in labels if frame in frames]:
+            series.append(plot.Series(
+                name, color,
+                [(frames[frame]['wall_s'], max(frames[frame][key], 1e-4)) for frame in wanted],
+                labels=tuple(labels[frame] for frame in wanted)))
     return plot.Panel(title, 'seconds a frame', 'error', series)
 
 

@@ -556,8 +556,8 @@ typedef enum brume_field_part {
     BRUME_FIELD_REFLECTED = 2,       /* injection of what surfaces reflect first, */
     BRUME_FIELD_SCATTERED = 3,       /* and of what media scatter first */
     BRUME_FIELD_BLOCKERS = 4,        /* fuzzy ones: injection, */
-    BRUME_FIELD_AGGREGATE = 5,       /* what was injected, put together: of blockers the greatest of all maps */
-    BRUME_FIELD_PREPARE = 6,         /* fuzzy blockers' factors of links; which cells lie around a lattice */
+    BRUME_FIELD_AGGREGATE = 5,       /* of what was injected; of blockers the greatest of all maps */
+    BRUME_FIELD_PREPARE = 6,         /* their factors of links; which cells lie around a lattice */
     BRUME_FIELD_ITERATIONS = 7,
     BRUME_FIELD_COPY = 8,            /* into the lattice that the view looks up */
     BRUME_FIELD_PARTS = 9

@@ -141,25 +141,16 @@ static void bind_level(const struct lpv_work *work)
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_POWERS, work->powers.id);
 }
 
-static void clear(const struct texture textures[3])
-{
-    static const float nothing[4];
-    for (int c = 0; c < 3; ++c)
-        glClearTexImage(textures[c].id, 0, GL_RGBA, GL_FLOAT, nothing);
-}
-
-/* What media scatter, into the textures that the first iteration fills anew. */
+/* What media scatter, into the textures that the first iteration fills anew; made empty, as the sums. */
 static brume_result scatter(struct lpv_work *work)
 {
+    if (!with_media(work))
+        return BRUME_OK;
     laps_go(work->laps, BRUME_FIELD_SCATTERED);
-    if (with_media(work)) {
-        const bool sky = work->input->frame->sky_dims.w != 0;
-        bind_images(SLOT_OUTPUT, work->flow[1], GL_WRITE_ONLY, GL_RGBA32F);
-        TRY(over_field(work, sky ? "lpv_scatter:SKY" : "lpv_scatter", (ivec4){0}));
-        glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
-    } else {
-        clear(work->flow[1]);
-    }
+    const bool sky = work->input->frame->sky_dims.w != 0;
+    bind_images(SLOT_OUTPUT, work->flow[1], GL_WRITE_ONLY, GL_RGBA32F);
+    TRY(over_field(work, sky ? "lpv_scatter:SKY" : "lpv_scatter", (ivec4){0}));
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     return BRUME_OK;
 }
 
@@ -173,7 +164,6 @@ static brume_result begin(struct lpv_work *work)
     laps_go(work->laps, BRUME_FIELD_PREPARE);
     if (!work->around)
         TRY(in_flight(work, &work->input->stats->power_begun));
-    clear(work->sums);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     return BRUME_OK;
 }

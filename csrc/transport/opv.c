@@ -24,6 +24,8 @@ static uint64_t tau_signature(const struct transport_input *input, const struct 
     hash = hash_bytes(hash, &frame->lattice_lower, sizeof frame->lattice_lower);
     hash = hash_bytes(hash, &frame->lattice_dims, sizeof frame->lattice_dims);
     hash = hash_bytes(hash, &point, sizeof point);
+    if (input->medium->forward > 0.0f) /* dom_astray looks at the world's medium, too */
+        hash = hash_bytes(hash, &frame->fog_sigma_s, sizeof frame->fog_sigma_s);
     for (uint32_t i = 0; count > 1 && i < light->samples.y; ++i)
         hash = hash_bytes(hash, &input->samples[light->samples.x + i].position, sizeof(float[3]));
     return hash;

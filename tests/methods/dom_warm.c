@@ -100,6 +100,41 @@ static void cold_is_as_fresh(void **state)
     brume_scene_destroy(scene);
 }
 
+/* A cube of fog that scatters strongly forwards, in a world's medium that does, too. */
+static float *in_a_medium(brume_scene *scene, float sigma_s)
+{
+    const brume_settings cold = settings_for(CELLS, 0);
+    const brume_world world = {
+        .has_volume = 1, .sigma_s = {sigma_s, sigma_s, sigma_s}, .g = 0.9f, .reach = 1.0f};
+    brume_view view = orthographic_view(origin, (float[3]){0.2f, 0.1f, 1}, 1.2f, 4.0f, 8);
+    view.passes = 1u << BRUME_PASS_VOLUME_DIRECT;
+    assert_ok(brume_scene_set_world(scene, &world));
+    brume_job *job = render(scene, &cold, &view);
+    float *pixels = read_pass(job, &view, BRUME_PASS_VOLUME_DIRECT);
+    brume_job_release(job);
+    return pixels;
+}
+
+/* So is the lamps' own light, whatever the world's medium was before. */
+static void another_world_is_as_fresh(void **state)
+{
+    (void)state;
+    const struct coefficients fog = {.sigma_s = {4, 4, 4}, .g = 0.9f};
+    brume_scene *scenes[2] = {empty(), empty()};
+    for (int i = 0; i < 2; ++i) {
+        add_fog_cube(scenes[i], 1, origin, 0.5f, &fog);
+        add_sun(scenes[i], 2, (float[3]){0, 0, -1});
+    }
+    free(in_a_medium(scenes[1], 2.0f));
+    float *fresh = in_a_medium(scenes[0], 0.1f), *after = in_a_medium(scenes[1], 0.1f);
+    assert_true(fresh[0] > 0.0f);
+    assert_memory_equal(after, fresh, 8 * 8 * 3 * sizeof *fresh);
+    free(fresh);
+    free(after);
+    brume_scene_destroy(scenes[0]);
+    brume_scene_destroy(scenes[1]);
+}
+
 /* What was known is still there after a run that was given up. */
 static void cancelled_run_loses_nothing(void **state)
 {
@@ -127,6 +162,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(begins_with_the_last),
         cmocka_unit_test(cold_is_as_fresh),
+        cmocka_unit_test(another_world_is_as_fresh),
         cmocka_unit_test(cancelled_run_loses_nothing),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);

@@ -27,95 +27,82 @@ uint64_t opv_propagate_bytes(const ivec4 *dims, uint32_t sources)
                                                                 : groups);
 }
 
-/* Along an axis the lattice is cut into groups, at both sides of the light. Their level is how many
- * bricks the light passes before. */
-struct axis_groups {
-    int origin, nodes, side; /* side: nodes along a group */
+/* Along an axis the lattice is cut into pieces, outwards from the light on both its sides. */
+struct axis {
+    int origin, side; /* side: nodes along a piece */
+    int below, count; /* pieces before the light, and all */
 };
 
-#define NO_GROUP INT32_MIN
+struct piece {
+    int first; /* node */
+    int level; /* how many bricks the light passes before */
+};
 
-/* The first node of the group that begins so many steps from the light, on either side. */
-static int group_first(const struct axis_groups *axis, int steps, int below)
+static struct axis cut_axis(int nodes, int origin, int side)
 {
-    if (below)
-        return axis->origin - steps >= 0 ? axis->origin - steps - (axis->side - 1) : NO_GROUP;
-    return axis->origin + 1 + steps < axis->nodes ? axis->origin + 1 + steps : NO_GROUP;
+    const int below = (origin + side) / side, above = (nodes - 2 - origin + side) / side;
+    return (struct axis){origin, side, below, below + above};
 }
 
-static int steps_of(const struct axis_groups *axis)
+static struct piece piece_of(const struct axis *axis, int number)
 {
-    const int above = axis->nodes - 1 - axis->origin, below = axis->origin + 1;
-    return above > below ? above : below;
-}
-
-static void cut_axes(const struct opv_work *run, uint32_t source, const struct program *program,
-                     struct axis_groups axes[3])
-{
-    const int *nodes = &run->input->frame->lattice_dims.x;
-    const int *origin = &run->sources[source].node.x;
-    for (int i = 0; i < 3; ++i)
-        axes[i] = (struct axis_groups){origin[i], nodes[i], program->group[i]};
-}
-
-/* Appends a source's groups of one level to out, unless it is NULL; their number. */
-static size_t list_level(const struct axis_groups axes[3], int level, int source, ivec4 *out)
-{
-    size_t count = 0;
-    for (int x = 0; x < steps_of(&axes[0]); x += axes[0].side)
-        for (int y = 0; y < steps_of(&axes[1]); y += axes[1].side) {
-            const int brick = (level - x / BRICK_NODES - y / BRICK_NODES) * BRICK_NODES;
-            for (int z = brick; z < brick + BRICK_NODES && z >= 0; z += axes[2].side)
-                for (int sides = 0; sides < 8; ++sides) {
-                    const ivec4 group = {group_first(&axes[0], x, sides & 1),
-                                         group_first(&axes[1], y, sides & 2),
-                                         group_first(&axes[2], z, sides & 4), source};
-                    if (group.x == NO_GROUP || group.y == NO_GROUP || group.z == NO_GROUP)
-                        continue;
-                    if (out)
-                        out[count] = group;
-                    ++count;
-                }
-        }
-    return count;
+    const int is_below = number < axis->below;
+    const int steps = (is_below ? number : number - axis->below) * axis->side;
+    return (struct piece){is_below ? axis->origin - steps - (axis->side - 1)
+                                   : axis->origin + 1 + steps,
+                          steps / BRICK_NODES};
 }
 
 /* The groups of some sources, level by level. */
 struct group_list {
     ivec4 *groups;
-    size_t *first; /* levels + 1 */
+    size_t *first; /* of each level, and where the last ends */
     int levels;
 };
+
+/* Counts a source's groups in places[level], or lists them at these places and moves them on. */
+static void list_source(const struct opv_work *run, uint32_t source, const struct program *program,
+                        size_t *places, ivec4 *groups)
+{
+    const int *nodes = &run->input->frame->lattice_dims.x;
+    const int *origin = &run->sources[source].node.x;
+    struct axis axes[3];
+    for (int i = 0; i < 3; ++i)
+        axes[i] = cut_axis(nodes[i], origin[i], program->group[i]);
+    for (int i = 0; i < axes[0].count; ++i)
+        for (int j = 0; j < axes[1].count; ++j)
+            for (int k = 0; k < axes[2].count; ++k) {
+                const struct piece x = piece_of(&axes[0], i), y = piece_of(&axes[1], j),
+                                   z = piece_of(&axes[2], k);
+                size_t *place = &places[x.level + y.level + z.level];
+                if (groups)
+                    groups[*place] = (ivec4){x.first, y.first, z.first, (int)source};
+                ++*place;
+            }
+}
 
 static brume_result list_groups(const struct opv_work *run, const struct program *program,
                                 uint32_t from, uint32_t end, struct group_list *list)
 {
-    struct axis_groups axes[3];
-    for (uint32_t i = from; i < end; ++i) {
-        cut_axes(run, i, program, axes);
-        int levels = 1;
-        for (int axis = 0; axis < 3; ++axis)
-            levels += (steps_of(&axes[axis]) - 1) / BRICK_NODES;
-        list->levels = levels > list->levels ? levels : list->levels;
-    }
-    list->first = calloc((size_t)list->levels + 1, sizeof *list->first);
+    const ivec4 dims = run->input->frame->lattice_dims;
+    list->levels = 1 + (dims.x - 1) / BRICK_NODES + (dims.y - 1) / BRICK_NODES +
+                   (dims.z - 1) / BRICK_NODES;
+    list->first = calloc((size_t)list->levels + 2, sizeof *list->first);
     if (!list->first)
         return fail(BRUME_E_MEMORY, "no memory to order a lattice");
-    for (int pass = 0; pass < 2; ++pass) {
-        size_t count = 0;
-        for (int level = 0; level < list->levels; ++level) {
-            for (uint32_t i = from; i < end; ++i) {
-                cut_axes(run, i, program, axes);
-                count +=
-                    list_level(axes, level, (int)i, list->groups ? list->groups + count : NULL);
-            }
-            list->first[level + 1] = count;
-        }
-        if (pass == 0)
-            list->groups = malloc((count + 1) * sizeof *list->groups);
-        if (!list->groups)
-            return fail(BRUME_E_MEMORY, "no memory to order a lattice");
-    }
+    /* Two places on, so that the second pass, which moves a level's first on to its end, leaves it
+     * where the next begins. */
+    for (uint32_t i = from; i < end; ++i)
+        list_source(run, i, program, list->first + 2, NULL);
+    for (int level = 0; level < list->levels; ++level)
+        list->first[level + 2] += list->first[level + 1];
+    list->groups = malloc((list->first[list->levels + 1] + 1) * sizeof *list->groups);
+    if (!list->groups)
+        return fail(BRUME_E_MEMORY, "no memory to order a lattice");
+    for (uint32_t i = from; i < end; ++i)
+        list_source(run, i, program, list->first + 1, list->groups);
+    while (list->first[list->levels - 1] == list->first[list->levels])
+        --list->levels; /* how many there are, the place of the light decides */
     return BRUME_OK;
 }
 

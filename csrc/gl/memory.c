@@ -95,12 +95,23 @@ int texture_side(int texels)
     return texels == 1 ? 3 : texels + 1;
 }
 
+/* Which are fetched, never filtered. */
+static int has_integers(GLenum format)
+{
+    return format == GL_R32UI || format == GL_RGBA8UI || format == GL_RGBA32UI;
+}
+
+void texture_clear(const struct texture *texture)
+{
+    const int integers = has_integers(texture->format);
+    glClearTexImage(texture->id, 0, integers ? GL_RGBA_INTEGER : GL_RGBA,
+                    integers ? GL_UNSIGNED_INT : GL_FLOAT, NULL);
+}
+
 brume_result texture_init(struct memory *memory, struct texture *texture, enum purpose purpose,
                           GLenum target, GLenum format, int width, int height, int depth,
                           int levels, const char *label)
 {
-    /* Which are fetched, never filtered. */
-    const int integers = format == GL_R32UI || format == GL_RGBA8UI || format == GL_RGBA32UI;
     memset(texture, 0, sizeof *texture);
     while (glGetError() != GL_NO_ERROR)
         ;
@@ -115,11 +126,8 @@ brume_result texture_init(struct memory *memory, struct texture *texture, enum p
         return fail(BRUME_E_MEMORY, "no graphics memory for %d x %d x %d texels of %s", width,
                     height, depth, label);
     }
-    if (target == GL_TEXTURE_3D) /* what no cell fills is read with weight 0, but NaN stays NaN */
-        glClearTexImage(texture->id, 0, integers ? GL_RGBA_INTEGER : GL_RGBA,
-                        integers ? GL_UNSIGNED_INT : GL_FLOAT, NULL);
     glObjectLabel(GL_TEXTURE, texture->id, -1, label);
-    const GLint filter = integers ? GL_NEAREST : GL_LINEAR;
+    const GLint filter = has_integers(format) ? GL_NEAREST : GL_LINEAR;
     glTextureParameteri(texture->id, GL_TEXTURE_MIN_FILTER,
                         levels > 1 ? GL_LINEAR_MIPMAP_LINEAR : filter);
     glTextureParameteri(texture->id, GL_TEXTURE_MAG_FILTER, filter);
@@ -132,6 +140,8 @@ brume_result texture_init(struct memory *memory, struct texture *texture, enum p
     texture->height = height;
     texture->depth = depth;
     texture->levels = levels;
+    if (target == GL_TEXTURE_3D) /* what no cell fills is read with weight 0, but NaN stays NaN */
+        texture_clear(texture);
     uint64_t level_texels = (uint64_t)width * (uint64_t)height * (uint64_t)depth;
     for (int level = 0; level < levels; ++level, level_texels /= 4)
         texture->bytes += level_texels * texel_bytes(format);

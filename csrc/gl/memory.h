@@ -50,7 +50,8 @@ void buffer_finish(struct memory *memory, struct buffer *buffer);
  * ceases to be. Lattices and pictures change their sizes while somebody waits. */
 int texture_side(int texels);
 
-/* target: GL_TEXTURE_2D, _2D_ARRAY or _3D. Linear filter (none for integers), clamp to edge. */
+/* target: GL_TEXTURE_2D, _2D_ARRAY or _3D. Linear filter (none for integers), clamp to edge. A new
+ * 3D texture holds 0. */
 brume_result texture_init(struct memory *memory, struct texture *texture, enum purpose purpose,
                           GLenum target, GLenum format, int width, int height, int depth,
                           int levels, const char *label);
@@ -58,6 +59,8 @@ brume_result texture_init(struct memory *memory, struct texture *texture, enum p
 brume_result texture_ensure(struct memory *memory, struct texture *texture, enum purpose purpose,
                             GLenum target, GLenum format, int width, int height, int depth,
                             int levels, const char *label);
+/* Makes the first level 0 everywhere. */
+void texture_clear(const struct texture *texture);
 void texture_finish(struct memory *memory, struct texture *texture);
 
 #endif

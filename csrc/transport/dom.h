@@ -25,8 +25,8 @@ void dom_quadrature(int count, vec4 directions[MOST_ORDINATES], int axes[3]);
 bool dom_has_surroundings(const struct transport_input *input);
 /* Tells the ordinate where in its map light is found. */
 void dom_place_map(const struct lpv_work *cells, struct gpu_ordinate *ordinate);
-/* Makes the maps, a layer an ordinate: radiance of the world, or of surfaces beyond the lattice that
- * hide it. Ordinates and lattice are there and bound; the texture is new, and the caller's. */
+/* Makes the maps, a layer an ordinate: radiance of the world, or of surfaces beyond the lattice
+ * that hide it. Ordinates and lattice are there and bound; the texture is new, and the caller's. */
 brume_result dom_look_out(struct lpv_work *cells, const vec4 *directions, int count,
                           struct texture *out);
 

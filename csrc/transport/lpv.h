@@ -61,7 +61,7 @@ brume_result lpv_make_product(struct texture *product, const struct transport_in
 /* The corners of a lattice. */
 void lpv_field_box(const struct gpu_field *field, float lower[3], float upper[3]);
 
-/* Links that surfaces cut, and what these reflect, into work->links, walls and lines. */
+/* Links that surfaces cut, and what these reflect, into work->links, walls and lines, which are new. */
 brume_result lpv_cut_links(struct lpv_work *work);
 /* What surfaces reflect of the lights' own light, into work->reflected; and where blockers are
  * fuzzy, the areas of the surfaces that lights see, or that are seen from outside. */

@@ -19,17 +19,9 @@ bool lpv_is_fuzzy(const struct lpv_work *work)
     return settings->method == BRUME_METHOD_LPV && settings->blockers == BRUME_BLOCKERS_FUZZY;
 }
 
-static void clear(const struct texture textures[2])
-{
-    static const float nothing[4];
-    for (int i = 0; i < 2; ++i)
-        glClearTexImage(textures[i].id, 0, GL_RGBA, GL_FLOAT, nothing);
-}
-
 brume_result lpv_fuzzy_begin(struct lpv_work *work)
 {
     static const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
-    static const uint32_t none;
     struct memory *memory = &work->input->gpu->memory;
     struct lpv_fuzzy *fuzzy = &work->fuzzy;
     const ivec4 field = work->field->dims;
@@ -41,6 +33,7 @@ brume_result lpv_fuzzy_begin(struct lpv_work *work)
         TRY(texture_init(memory, &fuzzy->sums[i], FOR_TRANSPORT, GL_TEXTURE_2D, GL_RGBA32F,
                          texture_side(dims.w * dims.x), texture_side(rows * dims.y), 1, 1,
                          "blocking areas of maps"));
+        texture_clear(&fuzzy->sums[i]);
         TRY(texture_init(memory, &fuzzy->areas[i], FOR_TRANSPORT, GL_TEXTURE_3D, GL_RGBA16F,
                          texture_side(dims.x), texture_side(dims.y), texture_side(dims.z), 1,
                          "blocking areas"));
@@ -52,10 +45,8 @@ brume_result lpv_fuzzy_begin(struct lpv_work *work)
     for (int i = 0; i < 2; ++i)
         glNamedFramebufferTexture(fuzzy->target, targets[i], fuzzy->sums[i].id, 0);
     glNamedFramebufferDrawBuffers(fuzzy->target, 2, targets);
-    clear(fuzzy->sums);
-    clear(fuzzy->areas);
     /* Cells' reflectances have been taken from what cut links; nothing is parted by them. */
-    glClearTexImage(work->links.id, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, &none);
+    texture_clear(&work->links);
     return BRUME_OK;
 }
 
@@ -93,7 +84,8 @@ brume_result lpv_fuzzy_keep(struct lpv_work *work)
                            GL_RGBA16F);
     }
     TRY(over_lattice(work, "lpv_fuzzy_keep", &fuzzy->dims));
-    clear(fuzzy->sums);
+    for (int i = 0; i < 2; ++i)
+        texture_clear(&fuzzy->sums[i]);
     return BRUME_OK;
 }
 

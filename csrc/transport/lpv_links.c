@@ -69,10 +69,8 @@ static brume_result draw(struct lpv_work *work, GLuint framebuffer)
     return BRUME_OK;
 }
 
-static void begin_with_nothing(int slot, const struct texture *texture)
+static void add_to(int slot, const struct texture *texture)
 {
-    static const uint32_t none;
-    glClearTexImage(texture->id, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, &none);
     glBindImageTexture((GLuint)slot, texture->id, 0, GL_TRUE, 0, GL_READ_WRITE, GL_R32UI);
 }
 
@@ -84,11 +82,11 @@ brume_result lpv_cut_links(struct lpv_work *work)
     TRY(texture_init(memory, &nearest, FOR_TRANSPORT, GL_TEXTURE_3D, GL_R32UI,
                      texture_side(2 * dims.x), texture_side(dims.y), texture_side(dims.z), 1,
                      "nearest surfaces"));
-    begin_with_nothing(SLOT_OUTPUT_LINKS, &work->links);
-    begin_with_nothing(SLOT_OUTPUT_WALLS, &work->walls);
-    begin_with_nothing(SLOT_OUTPUT_NEAREST, &nearest);
+    add_to(SLOT_OUTPUT_LINKS, &work->links);
+    add_to(SLOT_OUTPUT_WALLS, &work->walls);
+    add_to(SLOT_OUTPUT_NEAREST, &nearest);
     if (work->lines.id)
-        begin_with_nothing(SLOT_OUTPUT_LINES, &work->lines);
+        add_to(SLOT_OUTPUT_LINES, &work->lines);
     GLuint framebuffer;
     glCreateFramebuffers(1, &framebuffer);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);

@@ -230,10 +230,9 @@ static brume_result all_maps(struct lpv_work *work, struct maps *maps)
 
 brume_result lpv_reflect(struct lpv_work *work)
 {
-    static const float nothing[4];
     const struct geometry *geometry = work->input->geometry;
     for (int i = 0; i < 3; ++i)
-        glClearTexImage(work->reflected[i].id, 0, GL_RGBA, GL_FLOAT, nothing);
+        texture_clear(&work->reflected[i]);
     if (!(geometry->lower[0] <= geometry->upper[0]))
         return BRUME_OK;
     struct maps maps = {0};

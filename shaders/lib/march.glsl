@@ -42,14 +42,20 @@ struct march_state
 };
 
 // Mean of 1/d^2 over [t0, t1] of a ray whose nearest approach to a point, at distance h, is at
-// t = 0: the exact integral, so that a lamp in the fog makes no bright cell and no banding.
-float mean_inverse_square(float t0, float t1, float h)
+// t = 0: the exact integral, so that a lamp in the fog makes no bright cell and no banding. Turns
+// `within`, a place in the step, 0 to 1, into one that is as likely as 1/d^2 is large: what else varies
+// counts where the light is (Kulla and Fajardo, "Importance Sampling Techniques for Path Tracing in
+// Participating Media", EGSR 2012, sec. 4.1).
+float mean_inverse_square(float t0, float t1, float h, inout float within)
 {
     float x = t0 / h, y = t1 / h;
     // atan(y) - atan(x), without cancellation far from the lamp.
     float angle = atan((y - x), 1.0 + x * y);
     if (angle < 0.0)
         angle += PI;
+    // tan(atan(x) + within * angle) - x, likewise
+    float turned = tan(within * angle);
+    within = clamp(turned * (1.0 + x * x) / ((1.0 - x * turned) * (y - x)), 0.0, 1.0);
     return angle / (h * (t1 - t0));
 }
 
@@ -70,7 +76,17 @@ struct medium_step
     float g;
 };
 
-// False where the step is empty; `skipped` more steps then are too.
+// What scatters at a place.
+void look_up_scatter(vec3 p, bool in_lattice, inout medium_step m)
+{
+    vec4 scatter = in_lattice ? textureLod(medium_scatter, medium_coordinate(p), 0.0) : vec4(0.0);
+    m.sigma_s = scatter.rgb;
+    m.g = scatter.a;
+    if (fog_exists())
+        add_fog(m.sigma_s, m.g);
+}
+
+// The rest of it. False where the step is in an empty brick; `skipped` more steps then are too.
 bool look_up(view_ray ray, float t, float dt, float within, bool in_lattice, bool emission,
              out medium_step m, out int skipped)
 {
@@ -87,20 +103,16 @@ bool look_up(view_ray ray, float t, float dt, float within, bool in_lattice, boo
             }
         } else {
             vec3 uvw = medium_coordinate(p);
-            vec4 scatter = textureLod(medium_scatter, uvw, 0.0);
-            m.sigma_s = scatter.rgb;
-            m.g = scatter.a;
             m.sigma_t = textureLod(medium_extinct, uvw, 0.0).rgb;
             if (emission && frame.medium_upper.w != 0.0)
                 m.emission = textureLod(medium_emission, uvw, 0.0).rgb;
         }
     }
     if (fog) {
-        add_fog(m.sigma_s, m.g);
         m.sigma_t += frame.fog_sigma_t.rgb;
         m.emission += frame.fog_emission.rgb;
     }
-    return m.sigma_t != vec3(0.0) || m.emission != vec3(0.0);
+    return true;
 }
 
 // Integral of exp(-sigma_t s) over the step; its limit where the medium is thin.
@@ -163,27 +175,34 @@ float times_forward(medium_step m, vec3 depth)
 }
 #endif
 
-// What a lamp adds in a step from t0 on that is seen at t; what comes from behind it has less reach. Of the
-// peak's lobes below 0 a step may have less than nothing; a ray has not.
-vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, float t0, float t, float dt,
-               inout march_reach reach)
+// What a lamp adds in a step from t0 on, whose medium is known at a place within it; what it scatters there
+// may be. What comes from behind it has less reach. Of the peak's lobes below 0 a step may have less than
+// nothing; a ray has not.
+vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, bool in_lattice,
+               float t0, float within, float dt, inout march_reach reach)
 {
     vec3 through = exp(-m.sigma_t * dt);
 #ifdef DOM
     vec3 sharp_t = m.sigma_t + forward_share(m.g) * m.sigma_s;
     vec3 sharp_through = exp(-sharp_t * dt);
 #endif
-    vec3 p = ray.origin + ray.direction * t;
+    float falloff = 1.0;
+    if (!lamp.sun)
+        falloff = mean_inverse_square(t0 - lamp.along, t0 + dt - lamp.along, lamp.h, within);
+    vec3 p = ray.origin + ray.direction * (t0 + within * dt);
+    if (!(scatter_known && lamp.sun))
+        look_up_scatter(p, in_lattice, m);
     vec3 towards;
     float square;
-    vec3 intensity = light_intensity(lamp.light, lamp.light_sample.position.xyz, p, towards, square);
+    vec3 intensity =
+        falloff * light_intensity(lamp.light, lamp.light_sample.position.xyz, p, towards, square);
     float distance = lamp.sun ? 1e30 : sqrt(square);
+    if (m.sigma_s == vec3(0.0))
+        intensity = vec3(0.0);
     if (intensity != vec3(0.0))
         intensity *= light_shadow_medium(lamp.light, lamp.light_sample, p, distance);
     vec3 sum = vec3(0.0);
     if (intensity != vec3(0.0)) {
-        if (!lamp.sun)
-            intensity *= mean_inverse_square(t0 - lamp.along, t0 + dt - lamp.along, lamp.h);
         float cosine = dot(towards, ray.direction);
         vec4 depth = light_depth(lamp.light, p, towards, distance);
         vec3 here = m.sigma_s * intensity * exp(-depth.rgb);
@@ -227,8 +246,15 @@ vec3 march_lamp(uint number, vec3 transmittance, view_ray ray, float t_start, fl
         float t = t0 + within * dt;
         medium_step m;
         int skipped;
-        if (look_up(ray, t, dt, within, in_lattice, false, m, skipped))
-            sum += lamp_step(lamp, ray, m, t0, t, dt, reach);
+        if (look_up(ray, t, dt, within, in_lattice, false, m, skipped) &&
+            !(lamp.sun && m.sigma_t == vec3(0.0))) {
+#ifdef DOM // whose reach depends on it
+            look_up_scatter(ray.origin + ray.direction * t, in_lattice, m);
+            sum += lamp_step(lamp, ray, m, true, in_lattice, t0, within, dt, reach);
+#else
+            sum += lamp_step(lamp, ray, m, false, in_lattice, t0, within, dt, reach);
+#endif
+        }
         k += skipped;
     } while (++k < end);
     return max(sum, vec3(0.0)) * lamp.light.factors.z;
@@ -263,7 +289,7 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
     march_reach reach = reach_of(transmittance);
     vec3 lamp_sum = vec3(0.0);
 #endif
-    int first = count, end = 0; // the steps that are not empty
+    int first = count, end = 0; // the steps in bricks that are not empty
     int k = 0;
     do {
         bool open = true; // else one look-up did not tell the last step's field
@@ -279,6 +305,14 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             }
             first = min(first, k);
             end = k + 1;
+            // A lamp near by may see the step where it is not.
+            bool empty = m.sigma_t == vec3(0.0) && m.emission == vec3(0.0);
+#ifdef LAMPS
+            empty = empty && lamp.sun;
+#endif
+            if (empty)
+                continue;
+            look_up_scatter(ray.origin + ray.direction * t, in_lattice, m);
             vec3 through = exp(-m.sigma_t * dt);
             vec3 weight = transmittance * step_weight(m.sigma_t, through, dt);
             scattered = weight * m.sigma_s;
@@ -307,7 +341,7 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             }
             state.emission += weight * m.emission;
 #ifdef LAMPS
-            lamp_sum += lamp_step(lamp, ray, m, t0, t, dt, reach);
+            lamp_sum += lamp_step(lamp, ray, m, true, in_lattice, t0, within, dt, reach);
 #endif
             transmittance *= through;
             if (is_black(transmittance)) {

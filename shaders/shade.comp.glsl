@@ -22,9 +22,7 @@ vec3 light_surface(surface s, vec3 p, gpu_light light, ivec2 pixel, uint number)
     // Each pixel walks through all samples of the light, from a start of its own.
     uint turn = turn_of(uint(frame.size.z) + pixel_hash(pixel, number), light.samples.y);
     gpu_light_sample light_sample = light_sample_at(light.samples.x + turn);
-    vec2 lot = vec2(pixel_random(pixel, 2u * number + 101u),
-                    pixel_random(pixel, 2u * number + 102u)) * 2.0 - 1.0;
-    vec3 point = light_point(light, light_sample, lot);
+    vec3 point = light_point(light, light_sample, light_lot(pixel, number));
     vec3 towards;
     float square;
     vec3 intensity = light_intensity(light, point, p, towards, square);

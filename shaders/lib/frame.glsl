@@ -27,6 +27,14 @@ float pixel_random(ivec2 pixel, uint stream)
     return fract(start + float(frame.size.z) * 0.618033988749895);
 }
 
+// Two at once, spread over a square (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences",
+// 2018): two of the above go along its diagonal together.
+vec2 pixel_random_2(ivec2 pixel, uint stream)
+{
+    vec2 start = vec2(pixel_hash(pixel, stream), pixel_hash(pixel, stream + 1u)) * (1.0 / 4294967296.0);
+    return fract(start + float(frame.size.z) * vec2(0.754877666246693, 0.569840290998053));
+}
+
 // How often, and the rest. By floats, exact up to four million.
 ivec2 divided(int number, int by)
 {

@@ -65,6 +65,12 @@ vec2 square_to_disk(vec2 p)
     return radius * vec2(cos(angle), sin(angle));
 }
 
+// For a pixel's sample, where in its stratum a light's sample is: -1..1.
+vec2 light_lot(ivec2 pixel, uint number)
+{
+    return pixel_random_2(pixel, 2u * number + 101u) * 2.0 - 1.0;
+}
+
 // The point of the light that a sample stands for; on an area light moved by lot (-1..1) within the
 // sample's stratum.
 vec3 light_point(gpu_light light, gpu_light_sample s, vec2 lot)

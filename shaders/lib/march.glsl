@@ -60,13 +60,17 @@ float mean_inverse_square(float t0, float t1, float h, inout float within)
 }
 
 // The distance from the ray that mean_inverse_square wants, and in `along` the point's place on the
-// ray. Samples strewn over a disk that faces the medium would each have a bright core of their own.
-float nearest_approach(gpu_light light, gpu_light_sample s, view_ray ray, out float along)
+// ray. Samples strewn over a disk that faces the medium would each have a bright core of their own; those of an
+// area, which the pixels' samples move about, are blunt by a sixth of the radius of what each stands for: the
+// sharpest of their peaks would be grain, and hold 1 % of the light right before the lamp.
+float nearest_approach(gpu_light light, vec3 point, view_ray ray, out float along)
 {
-    vec3 v = (is_disk(light) ? light.position.xyz : s.position.xyz) - ray.origin;
+    bool disk = is_disk(light);
+    vec3 v = (disk ? light.position.xyz : point) - ray.origin;
     along = dot(v, ray.direction);
     vec3 off = v - along * ray.direction;
-    return sqrt(max(dot(off, off) + softness(light), 1e-8));
+    float share = light.radiance.w / (PI * float(light.samples.y)); // of the area: radius squared
+    return sqrt(max(dot(off, off) + (disk ? softness(light) : 0.03 * share), 1e-8));
 }
 
 // The medium at one step of the ray: lattice and fog together.
@@ -139,6 +143,7 @@ struct lamp_ray
 {
     gpu_light light;
     gpu_light_sample light_sample;
+    vec3 point; // that it stands for
     bool sun;
     float along, h; // as nearest_approach() has them
 };
@@ -150,7 +155,8 @@ lamp_ray lamp_along(uint number, view_ray ray, ivec2 pixel)
     uint turn = turn_of(uint(frame.size.z) + pixel_hash(pixel, number), lamp.light.samples.y);
     lamp.light_sample = light_sample_at(lamp.light.samples.x + turn);
     lamp.sun = lamp.light.info.x == uint(LIGHT_SUN);
-    lamp.h = nearest_approach(lamp.light, lamp.light_sample, ray, lamp.along);
+    lamp.point = light_point(lamp.light, lamp.light_sample, light_lot(pixel, number));
+    lamp.h = nearest_approach(lamp.light, lamp.point, ray, lamp.along);
     return lamp;
 }
 
@@ -195,7 +201,7 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, b
     vec3 towards;
     float square;
     vec3 intensity =
-        falloff * light_intensity(lamp.light, lamp.light_sample.position.xyz, p, towards, square);
+        falloff * light_intensity(lamp.light, lamp.point, p, towards, square);
     float distance = lamp.sun ? 1e30 : sqrt(square);
     if (m.sigma_s == vec3(0.0))
         intensity = vec3(0.0);

@@ -6,10 +6,10 @@
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 [ $# -gt 0 ] || set -- plume plume_vdb cloud room cube lamps surfaces environment \
-    fog_one fog_sixteen fog_lights arcade room_smoke partition lantern smoke_sky
+    fog_one fog_sixteen fog_lights arcade room_smoke partition lantern smoke_sky cumulus
 for name; do
     case $name in
-        fog_* | arcade | room_smoke | partition | lantern | smoke_sky)
+        fog_* | arcade | room_smoke | partition | lantern | smoke_sky | cumulus)
             blender=$here/../scripts/blender
             ;;
         *) blender=${BLENDER:-blender} ;;

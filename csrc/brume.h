@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* Raised by every change to a struct, an enumerator or a function below. */
-#define BRUME_ABI 8u
+#define BRUME_ABI 9u
 
 BRUME_API uint32_t brume_abi(void);
 
@@ -233,7 +233,11 @@ typedef enum brume_op {
     BRUME_OP_COMPONENT = 47, /* all = component number b of a */
     BRUME_OP_COMBINE = 48,   /* (a.x, b.x, c.x) */
     BRUME_OP_BLACKBODY = 49, /* linear Rec.709 of a black body of a.x kelvin, luminance 1 */
-    BRUME_OP_COUNT = 50
+    BRUME_OP_POSITION = 50,  /* the middle of the cell, in the brume_space number a */
+    BRUME_OP_NOISE = 51,     /* Blender's Noise Texture, scaled, at a. b.x: detail, b.y: roughness,
+                                b.z: lacunarity. c.x: W, c.y: distortion. value: dimensions, 1 to 4;
+                                1 if normalized; 1 for its three colours, 0 for Fac in all */
+    BRUME_OP_COUNT = 52
 } brume_op;
 
 #define BRUME_REGISTERS 64u
@@ -243,6 +247,13 @@ typedef struct brume_instruction {
     uint32_t op, dst, a, b, c; /* registers, but for the numbers that the op's line names */
     float value[3];
 } brume_instruction;
+
+typedef enum brume_space {
+    BRUME_SPACE_OBJECT = 0,
+    BRUME_SPACE_WORLD = 1,
+    BRUME_SPACE_GENERATED = 2, /* 0 to 1 along each side of the volume's generated box */
+    BRUME_SPACE_COUNT = 3
+} brume_space;
 
 typedef struct brume_volume_program {
     const brume_instruction *instructions;
@@ -278,6 +289,7 @@ typedef struct brume_volume {
     brume_volume_program program;
     float world_from_object[16];
     float scale;                     /* multiplies all coefficients; 0 means 1 */
+    float generated_lower[3], generated_upper[3]; /* object space; an empty side is all 0 there */
     float reserved2;
 } brume_volume;
 

@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-ABI = 8
+ABI = 9
 PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONMENT",
           "TRANSMITTANCE", "VOLUME_INDIRECT")
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3, 3)
@@ -51,8 +51,10 @@ OPS = (
     "ABSOLUTE EXPONENT MINIMUM MAXIMUM LESS GREATER SIGN COMPARE SMOOTH_MIN SMOOTH_MAX ROUND "
     "FLOOR CEIL TRUNCATE FRACTION MODULO WRAP SNAP PINGPONG SINE COSINE TANGENT ARCSINE ARCCOSINE "
     "ARCTANGENT ARCTANGENT2 HYPERBOLIC_SINE HYPERBOLIC_COSINE HYPERBOLIC_TANGENT CLAMP01 MIX "
-    "SMOOTHSTEP SMOOTHERSTEP RAMP AVERAGE LUMINANCE COMPONENT COMBINE BLACKBODY").split()
+    "SMOOTHSTEP SMOOTHERSTEP RAMP AVERAGE LUMINANCE COMPONENT COMBINE BLACKBODY POSITION "
+    "NOISE").split()
 OP = {name: number for number, name in enumerate(OPS)}
+SPACES = {"OBJECT": 0, "WORLD": 1, "GENERATED": 2}  # of POSITION
 REGISTERS = 64
 RAMP_SIZE = 256
 IDENTITY = np.eye(4)
@@ -112,7 +114,8 @@ class Volume(Structure):
                 ("triangles", c_void_p), ("gaussians", c_void_p), ("grid_count", c_uint32),
                 ("vertex_count", c_uint32), ("triangle_count", c_uint32),
                 ("gaussian_count", c_uint32), ("program", VolumeProgram),
-                ("world_from_object", Mat4), ("scale", c_float), ("reserved2", c_float)]
+                ("world_from_object", Mat4), ("scale", c_float), ("generated_lower", Vec3),
+                ("generated_upper", Vec3), ("reserved2", c_float)]
 
 
 class Mesh(Structure):
@@ -520,10 +523,10 @@ class Scene(Handle):
             Vec3(*sigma_a), Vec3(*emission), g, reach)))
 
     def set_volume(self, key, *, name, program, world_from_object, scale=1.0, grids=(),
-                   positions=None, triangles=None, gaussians=None):
+                   positions=None, triangles=None, gaussians=None, generated=None):
         """program: has instructions (op, dst, a, b, c, value), ramps (n, 256, 3) and the four
         result registers. grids: Grid or None each. gaussians: (n, 8): center, scale, color,
-        amplitude."""
+        amplitude. generated: the corners of the box that generated coordinates span."""
         positions = _array(positions, np.float32)
         triangles = _array(triangles, np.uint32)
         gaussians = _array(gaussians, np.float32)
@@ -539,7 +542,8 @@ class Scene(Handle):
             _count(gaussians, 8),
             VolumeProgram(code, _pointer(ramps), len(program.instructions), len(program.ramps),
                           program.sigma_s, program.sigma_a, program.g, program.emission),
-            matrix(world_from_object), scale)))
+            matrix(world_from_object), scale,
+            *(Vec3(*corner) for corner in generated or ()))))
 
     def render(self, settings, view):
         out = c_void_p()

@@ -34,7 +34,7 @@ struct share {
     bool dark;                    /* where all grids are 0 there is nothing */
     /* meshes */
     float *coverage;
-    struct medium_sample constant;
+    struct medium_sample constant; /* of a program that is the same everywhere */
     /* Gaussians */
     struct splats splats;
 };
@@ -93,6 +93,34 @@ static void share_cells(const struct build *build, struct share *share)
     }
 }
 
+/* Where a row of the share's cells lies, from (i, j, k) on along x. In double: far from the world's
+ * origin a float has no digits left for cells. */
+static struct cell_row row_from(const struct build *build, const struct share *share, int32_t i,
+                                int32_t j, int32_t k)
+{
+    const struct medium_lattice *lattice = build->lattice;
+    const struct volume *volume = share->volume;
+    const int32_t cell[3] = {i, j, k};
+    const float *m = volume->object_from_world;
+    struct cell_row row = {.step[BRUME_SPACE_WORLD][0] = lattice->cell};
+    double *world = row.first[BRUME_SPACE_WORLD];
+    for (int axis = 0; axis < 3; ++axis)
+        world[axis] =
+            lattice->lower[axis] + (share->first[axis] + cell[axis] + 0.5) * lattice->cell;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double at = m[axis] * world[0] + m[4 + axis] * world[1] + m[8 + axis] * world[2] +
+                          m[12 + axis];
+        const double step = (double)m[axis] * lattice->cell;
+        const double lower = volume->generated_lower[axis];
+        const double side = volume->generated_upper[axis] - lower;
+        row.first[BRUME_SPACE_OBJECT][axis] = at;
+        row.step[BRUME_SPACE_OBJECT][axis] = step;
+        row.first[BRUME_SPACE_GENERATED][axis] = side != 0.0 ? (at - lower) / side : 0.0;
+        row.step[BRUME_SPACE_GENERATED][axis] = side != 0.0 ? step / side : 0.0;
+    }
+    return row;
+}
+
 /* Adds count samples, step apart, times weights, to the cells of row (j, k) from i on. */
 static void add_row(struct build *build, const struct share *share, int32_t i, int32_t j, int32_t k,
                     int32_t count, const struct medium_sample *samples, size_t step,
@@ -129,12 +157,26 @@ static void add_row(struct build *build, const struct share *share, int32_t i, i
         __atomic_store_n(&build->emits, true, __ATOMIC_RELAXED);
 }
 
-static void add_mesh_plane(struct build *build, const struct share *share, int32_t k)
+/* samples: room for a row, or NULL where the program is the same everywhere. */
+static void add_mesh_plane(struct build *build, const struct share *share,
+                           struct medium_sample *samples, int32_t k)
 {
     const int32_t *dims = share->dims;
-    for (int32_t j = 0; j < dims[1] && !stopped(build); ++j)
-        add_row(build, share, 0, j, k, dims[0], &share->constant, 0,
-                share->coverage + ((size_t)k * (size_t)dims[1] + (size_t)j) * (size_t)dims[0]);
+    for (int32_t j = 0; j < dims[1] && !stopped(build); ++j) {
+        const float *coverage =
+            share->coverage + ((size_t)k * (size_t)dims[1] + (size_t)j) * (size_t)dims[0];
+        int32_t from = 0, to = dims[0];
+        while (from < to && coverage[from] <= 0.0f)
+            ++from;
+        while (from < to && coverage[to - 1] <= 0.0f)
+            --to;
+        if (samples && from < to) {
+            const struct cell_row row = row_from(build, share, from, j, k);
+            volume_program_run(&share->volume->program, NULL, &row, (uint32_t)(to - from), samples);
+        }
+        add_row(build, share, from, j, k, to - from, samples ? samples : &share->constant,
+                samples ? 1 : 0, coverage + from);
+    }
 }
 
 /* Whether there is anything to compute for a cell of a plane. */
@@ -195,7 +237,8 @@ static void add_grid_plane(struct build *build, const struct share *share, struc
                     for (int c = 0; c < 3; ++c)
                         means[3 * i + c] /= inside[i];
         }
-        volume_program_run(&share->volume->program, worker->rows, (uint32_t)(to - from),
+        const struct cell_row place = row_from(build, share, from, j, k);
+        volume_program_run(&share->volume->program, worker->rows, &place, (uint32_t)(to - from),
                            worker->samples);
         add_row(build, share, from, j, k, to - from, worker->samples, 1, inside + from);
     }
@@ -213,11 +256,23 @@ static brume_result add_mesh(struct build *build, struct share *share)
     share_from(build, share, volume->world_from_object, from_object);
     TRY(voxelize_mesh(volume->positions, volume->vertex_count, volume->triangles,
                       volume->triangle_count, from_object, dims, share->coverage));
-    volume_program_run(&volume->program, NULL, 1, &share->constant);
-#pragma omp parallel for schedule(dynamic)
-    for (int32_t k = 0; k < dims[2]; ++k)
-        add_mesh_plane(build, share, k);
-    return BRUME_OK;
+    const bool placed = volume_program_is_placed(&volume->program);
+    if (!placed)
+        volume_program_run(&volume->program, NULL, NULL, 1, &share->constant);
+    bool memory = true;
+#pragma omp parallel reduction(&& : memory)
+    {
+        struct medium_sample *samples =
+            placed ? malloc((size_t)dims[0] * sizeof *samples) : NULL;
+        memory = samples || !placed;
+#pragma omp for schedule(dynamic)
+        for (int32_t k = 0; k < dims[2]; ++k)
+            if (memory)
+                add_mesh_plane(build, share, samples, k);
+        free(samples);
+    }
+    return memory ? BRUME_OK
+                  : fail(BRUME_E_MEMORY, "no memory to fill volume '%s'", volume->name);
 }
 
 static bool program_reads(const struct volume_program *program, uint32_t grid)
@@ -257,9 +312,12 @@ static brume_result prepare_grids(const struct build *build, struct share *share
         TRY(resampler_init(&share->resamplers[grid], volume->grids[grid], box_from_array,
                            share->dims));
     }
-    struct medium_sample nothing;
-    volume_program_run(&volume->program, NULL, 1, &nothing);
-    share->dark = is_nothing(&nothing);
+    /* One that asks where it is may give something elsewhere. */
+    if (!volume_program_is_placed(&volume->program)) {
+        struct medium_sample nothing;
+        volume_program_run(&volume->program, NULL, NULL, 1, &nothing);
+        share->dark = is_nothing(&nothing);
+    }
     return BRUME_OK;
 }
 
@@ -336,7 +394,9 @@ static void add_gaussian_plane(struct build *build, const struct share *share,
         if (from == to)
             continue;
         const float *rows[2] = {worker->means + 3 * from, worker->means + 3 * (width + from)};
-        volume_program_run(&share->volume->program, rows, (uint32_t)(to - from), worker->samples);
+        const struct cell_row place = row_from(build, share, from, j, k);
+        volume_program_run(&share->volume->program, rows, &place, (uint32_t)(to - from),
+                           worker->samples);
         add_row(build, share, from, j, k, to - from, worker->samples, 1, worker->inside + from);
     }
 }

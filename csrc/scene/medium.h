@@ -23,6 +23,7 @@ struct volume {
     struct volume_program program;
     float world_from_object[16];
     float object_from_world[16];
+    float generated_lower[3], generated_upper[3];
     float scale;
     float lower[3], upper[3];        /* world-axis bounds of what can be non-zero; where nothing
                                         can, infinite and the wrong way round */
@@ -48,8 +49,8 @@ struct medium_lattice {
 };
 
 /* The resolution at which cells are as small as the smallest voxel of the grids, or as the
- * narrowest Gaussian needs: more cells would show nothing more. INT32_MAX with a mesh, whose shape
- * any resolution makes better. */
+ * narrowest Gaussian needs: more cells would show nothing more. INT32_MAX with a mesh or a texture,
+ * which any resolution makes better. */
 int32_t medium_useful_resolution(struct volume *const *volumes, uint32_t count);
 
 /* resolution: cells along the longest side of the volumes' joint bounds. max_cells: a limit that

@@ -49,7 +49,8 @@ static double joint_bounds(struct volume *const *volumes, uint32_t count, double
 
 /* The finest that the volumes hold. */
 struct voxels {
-    double side;      /* m; 0 where a mesh gives the medium, whose shape any resolution makes better */
+    double side;      /* m; 0 where any resolution makes it better: of a mesh the shape, of a
+                         program the texture */
     bool cubes;       /* those of a grid, along the world's axes */
     double corner[3]; /* of one of these cubes */
 };
@@ -96,7 +97,7 @@ static struct voxels finest_voxels(struct volume *const *volumes, uint32_t count
 {
     struct voxels voxels = {.side = INFINITY};
     for (uint32_t i = 0; i < count; ++i) {
-        if (volumes[i]->positions)
+        if (volumes[i]->positions || volume_program_is_placed(&volumes[i]->program))
             return (struct voxels){.side = 0.0};
         for (uint32_t g = 0; g < volumes[i]->grid_count; ++g)
             if (volumes[i]->grids[g])

@@ -197,6 +197,8 @@ brume_result volume_create(const brume_volume *source, struct volume **out)
     snprintf(volume->name, sizeof volume->name, "%s", name);
     memcpy(volume->world_from_object, source->world_from_object, sizeof volume->world_from_object);
     volume->scale = source->scale == 0.0f ? 1.0f : source->scale;
+    memcpy(volume->generated_lower, source->generated_lower, sizeof volume->generated_lower);
+    memcpy(volume->generated_upper, source->generated_upper, sizeof volume->generated_upper);
 
     brume_result result = BRUME_OK;
     if (!(volume->scale > 0.0f && isfinite(volume->scale)))

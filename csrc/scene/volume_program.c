@@ -3,6 +3,7 @@
  * instruction costs little beside doing it. Any thread. */
 #include "scene/volume_program.h"
 #include "base/result.h"
+#include "scene/noise.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -70,6 +71,8 @@ static const struct {
     [BRUME_OP_COMPONENT] = {"COMPONENT", 1},
     [BRUME_OP_COMBINE] = {"COMBINE", 3},
     [BRUME_OP_BLACKBODY] = {"BLACKBODY", 1},
+    [BRUME_OP_POSITION] = {"POSITION", 0},
+    [BRUME_OP_NOISE] = {"NOISE", 3},
 };
 
 /* --- Black bodies ------------------------------------------------------------------------- */
@@ -197,6 +200,13 @@ static brume_result check_instruction(const brume_volume_program *program, uint3
     if (instruction->op == BRUME_OP_COMPONENT && instruction->b >= 3)
         return fail(BRUME_E_SHADER_PROGRAM, "volume '%s': %s names component %u of 3", volume_name,
                     what, instruction->b);
+    if (instruction->op == BRUME_OP_POSITION && instruction->a >= BRUME_SPACE_COUNT)
+        return fail(BRUME_E_SHADER_PROGRAM, "volume '%s': %s names space %u of %d", volume_name,
+                    what, instruction->a, BRUME_SPACE_COUNT);
+    if (instruction->op == BRUME_OP_NOISE &&
+        !(instruction->value[0] >= 1.0f && instruction->value[0] <= 4.0f))
+        return fail(BRUME_E_SHADER_PROGRAM, "volume '%s': %s has %g dimensions, not 1 to 4",
+                    volume_name, what, (double)instruction->value[0]);
     if (instruction->dst >= BRUME_REGISTERS)
         return fail(BRUME_E_SHADER_PROGRAM,
                     "volume '%s': %s writes register %u, but there are only %u", volume_name, what,
@@ -353,9 +363,28 @@ static inline float pingpong(float a, float scale)
     RUN(n, const float value = (expression); dst[i] = value; dst[n + i] = value; \
         dst[2 * n + i] = value)
 
+static void run_noise(const brume_instruction *instruction, const float *a, const float *b,
+                      const float *c, uint32_t n, float *dst)
+{
+    struct noise noise = {.dimensions = (int)instruction->value[0],
+                          .normalized = instruction->value[1] != 0.0f};
+    for (uint32_t i = 0; i < n; ++i) {
+        noise.detail = b[i];
+        noise.roughness = b[n + i];
+        noise.lacunarity = b[2 * n + i];
+        noise.distortion = c[n + i];
+        const float at[4] = {noise.dimensions > 1 ? a[i] : c[i], a[n + i], a[2 * n + i], c[i]};
+        float out[3];
+        noise_at(&noise, at, instruction->value[2] != 0.0f, out);
+        for (uint32_t component = 0; component < 3; ++component)
+            dst[component * n + i] = out[component];
+    }
+}
+
 static void run_instruction(const brume_volume_program *program,
                             const brume_instruction *instruction, const float *const *grids,
-                            size_t first, uint32_t n, float (*registers)[3 * BLOCK])
+                            const struct cell_row *row, size_t first, uint32_t n,
+                            float (*registers)[3 * BLOCK])
 {
     float *dst = registers[instruction->dst];
     const uint32_t count = ops[instruction->op].registers;
@@ -493,6 +522,17 @@ static void run_instruction(const brume_volume_program *program,
                 dst[component * n + i] = rgb[component];
         }
         break;
+    case BRUME_OP_POSITION:
+        for (uint32_t component = 0; component < 3; ++component)
+            for (uint32_t i = 0; i < n; ++i)
+                dst[component * n + i] =
+                    row ? (float)(row->first[instruction->a][component] +
+                                  (double)(first + i) * row->step[instruction->a][component])
+                        : 0.0f;
+        break;
+    case BRUME_OP_NOISE:
+        run_noise(instruction, a, b, c, n, dst);
+        break;
     case BRUME_OP_COUNT:
         break;
     }
@@ -509,15 +549,24 @@ static inline float sane_g(float g)
     return g > -0.99f ? minimum(g, 0.99f) : g == g ? -0.99f : 0.0f;
 }
 
+bool volume_program_is_placed(const struct volume_program *program)
+{
+    const brume_volume_program *code = &program->program;
+    for (uint32_t i = 0; i < code->instruction_count; ++i)
+        if (code->instructions[i].op == BRUME_OP_POSITION)
+            return true;
+    return false;
+}
+
 void volume_program_run(const struct volume_program *program, const float *const *grids,
-                        uint32_t count, struct medium_sample *out)
+                        const struct cell_row *row, uint32_t count, struct medium_sample *out)
 {
     const brume_volume_program *code = &program->program;
     float registers[BRUME_REGISTERS][3 * BLOCK];
     for (uint32_t first = 0; first < count; first += BLOCK) {
         const uint32_t n = count - first < BLOCK ? count - first : BLOCK;
         for (uint32_t i = 0; i < code->instruction_count; ++i)
-            run_instruction(code, &code->instructions[i], grids, first, n, registers);
+            run_instruction(code, &code->instructions[i], grids, row, first, n, registers);
 
         const float *sigma_s = registers[code->sigma_s], *sigma_a = registers[code->sigma_a];
         const float *emission = registers[code->emission], *g = registers[code->g];

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the user guide's pictures: scenes rendered by Brume, and its panels in Blender's window.
 
-    docs/images/make.py [NAME]...    all, or some: room cloud fog_lights fog_sixteen panels viewport
+    docs/images/make.py [NAME]...    all, or some: room cloud cumulus fog_lights fog_sixteen panels viewport
                                      lpv_paths lpv_hard
 
 Needs what scripts/setup installs, and a built library; a virtual display is its own. lpv_paths sets
@@ -25,7 +25,7 @@ import lpv
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
-SCENES = ("room", "cloud", "fog_lights", "fog_sixteen")
+SCENES = ("room", "cloud", "cumulus", "fog_lights", "fog_sixteen")
 SIZE = 640, 360
 FINAL = f"""
 import bpy

@@ -94,6 +94,8 @@ CASES = {case.name: case for case in (
     Case('surfaces', (), 0.03, 256, change='percentage'),
     Case('cube', (), 0.04, 512, change='inside'),
     Case('cube', (), 0.04, 512, change='fog_on_film'),
+    Case('cube', (), 0.04, 512, zoom=1.4, step_rate=0.1, change='textured'),
+    Case('cloud', (), 0.04, 512, zoom=1.15, change='graded'),
     # With the default of 32 directions the sky's shadows have steps: 0.055.
     Case('lamps', (), 0.03, 1024, zoom=1.3, change='sky_alone', world_samples=128),
     Case('lamps', (), 0.02, 512, change='lamps_seen'),

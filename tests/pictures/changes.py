@@ -80,6 +80,51 @@ def milk(scene):
     scene.world.node_tree.nodes['Background'].inputs['Strength'].default_value = 1.0
 
 
+def textured(scene):
+    """Drifts of noise in the fog, on one side of a slope askew to it, thinner upwards."""
+    tree = scene.objects['Fog'].active_material.node_tree
+    new, link = tree.nodes.new, tree.links.new
+    noise, coordinates, mapping, slope, place, height = map(new, (
+        'ShaderNodeTexNoise', 'ShaderNodeTexCoord', 'ShaderNodeMapping', 'ShaderNodeTexGradient',
+        'ShaderNodeNewGeometry', 'ShaderNodeSeparateXYZ'))
+    for name, value in (('Scale', 3.5), ('Detail', 2.5), ('Roughness', 0.4), ('Distortion', 0.6)):
+        noise.inputs[name].default_value = value  # at generated coordinates
+    link(coordinates.outputs['Object'], mapping.inputs['Vector'])
+    mapping.inputs['Rotation'].default_value = (0.3, 0.2, 0.8)
+    mapping.inputs['Location'].default_value = (0.6, 0.0, 0.0)
+    link(mapping.outputs[0], slope.inputs['Vector'])
+    link(place.outputs['Position'], height.inputs[0])
+
+    def math(operation, *values):
+        node = new('ShaderNodeMath')
+        node.operation = operation
+        for socket, value in zip(node.inputs, values):
+            if isinstance(value, float):
+                socket.default_value = value
+            else:
+                link(value, socket)
+        return node.outputs[0]
+    drifts = math('MULTIPLY', math('MAXIMUM', math('SUBTRACT', noise.outputs['Fac'], 0.45), 0.0),
+                  40.0)
+    thinner = math('SUBTRACT', 1.6, math('MULTIPLY', height.outputs['Z'], 0.7))
+    density = math('MULTIPLY', math('MULTIPLY', drifts, slope.outputs['Fac']), thinner)
+    link(density, tree.nodes['Volume Scatter'].inputs['Density'])
+
+
+def graded(scene):
+    """The cloud's density along its generated coordinates."""
+    tree = scene.objects['Cloud'].active_material.node_tree
+    new, link = tree.nodes.new, tree.links.new
+    principled = next(n for n in tree.nodes if n.bl_idname == 'ShaderNodeVolumePrincipled')
+    slope, steeper = new('ShaderNodeTexGradient'), new('ShaderNodeMath')
+    coordinates = new('ShaderNodeTexCoord')
+    steeper.operation = 'MULTIPLY'
+    steeper.inputs[1].default_value = 2.0 * principled.inputs['Density'].default_value
+    link(coordinates.outputs['Generated'], slope.inputs['Vector'])
+    link(slope.outputs['Fac'], steeper.inputs[0])
+    link(steeper.outputs[0], principled.inputs['Density'])
+
+
 def sky_alone(scene):
     """A plain sky over matt things that hide it from one another."""
     for thing in scene.objects:

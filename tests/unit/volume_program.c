@@ -24,7 +24,7 @@ static void run_op(uint32_t op, const float a[3], const float b[3], const float 
         {.op = BRUME_OP_CONSTANT, .dst = 10, .value = {a[0], a[1], a[2]}},
         {.op = BRUME_OP_CONSTANT, .dst = 11, .value = {b[0], b[1], b[2]}},
         {.op = BRUME_OP_CONSTANT, .dst = 12, .value = {c[0], c[1], c[2]}},
-        {.op = op, .dst = 13, .a = 10, .b = 11, .c = 12},
+        {.op = op, .dst = 13, .a = 10, .b = 11, .c = 12, .value = {3, 1, 1}}, /* of NOISE */
         {.op = BRUME_OP_CONSTANT, .dst = 0, .value = {offset, offset, offset}},
         {.op = BRUME_OP_ADD, .dst = 1, .a = 0, .b = 13},
         {.op = BRUME_OP_CONSTANT, .dst = 2},
@@ -38,7 +38,7 @@ static void run_op(uint32_t op, const float a[3], const float b[3], const float 
     struct volume_program program;
     assert_int_equal(volume_program_init(&program, &source, 0, "ops"), BRUME_OK);
     struct medium_sample sample;
-    volume_program_run(&program, NULL, 1, &sample);
+    volume_program_run(&program, NULL, NULL, 1, &sample);
     for (int i = 0; i < 3; ++i)
         out[i] = sample.emission[i] - offset;
     volume_program_finish(&program);
@@ -196,7 +196,7 @@ static void a_register_may_be_both_ends(void **state)
     for (int i = 0; i < COUNT * 3; ++i)
         grid[i] = (float)i;
     const float *grids[1] = {grid};
-    volume_program_run(&program, grids, COUNT, samples);
+    volume_program_run(&program, grids, NULL, COUNT, samples);
     for (int i = 0; i < COUNT; ++i) {
         const float x = (float)(3 * i), z = x + 2;
         assert_float_equal(samples[i].sigma_s[0], 2 * z, 1e-3f);
@@ -206,7 +206,7 @@ static void a_register_may_be_both_ends(void **state)
     }
     /* A grid that is not there reads 0. */
     grids[0] = NULL;
-    volume_program_run(&program, grids, COUNT, samples);
+    volume_program_run(&program, grids, NULL, COUNT, samples);
     assert_true(samples[COUNT - 1].sigma_s[0] == 0.0f);
     volume_program_finish(&program);
     volume_program_finish(&program);
@@ -241,7 +241,7 @@ static void a_ramp_is_linear_between_its_entries(void **state)
         grid[3 * i] = at[i];
     const float *grids[1] = {grid};
     struct medium_sample samples[6];
-    volume_program_run(&program, grids, 6, samples);
+    volume_program_run(&program, grids, NULL, 6, samples);
     for (int i = 0; i < 6; ++i)
         for (int c = 0; c < 3; ++c)
             assert_float_equal(samples[i].sigma_s[c], expected[i] + (float)c, 1e-2f);
@@ -326,7 +326,7 @@ static void results_are_what_transport_can_bear(void **state)
     }
     const float *grids[2] = {values, gs};
     struct medium_sample samples[6];
-    volume_program_run(&program, grids, 6, samples);
+    volume_program_run(&program, grids, NULL, 6, samples);
     for (int i = 0; i < 6; ++i) {
         const float *results[3] = {samples[i].sigma_s, samples[i].sigma_a, samples[i].emission};
         for (int r = 0; r < 3; ++r) {
@@ -345,8 +345,8 @@ static void awkward_numbers_do_no_harm(void **state)
     (void)state;
     const float awkward[9] = {0.0f, -0.0f, 1e38f, -1e38f, 1e-42f, NAN, INFINITY, -INFINITY, 2.5f};
     for (uint32_t op = 2; op < BRUME_OP_COUNT; ++op) {
-        if (op == BRUME_OP_RAMP || op == BRUME_OP_COMPONENT)
-            continue; /* their b is a number */
+        if (op == BRUME_OP_RAMP || op == BRUME_OP_COMPONENT || op == BRUME_OP_POSITION)
+            continue; /* their a or b is a number */
         for (int i = 0; i < 729; ++i) {
             const float a[3] = {awkward[i % 9], awkward[i % 9], 1.0f};
             const float b[3] = {awkward[i / 9 % 9], awkward[i / 9 % 9], 1.0f};
@@ -391,7 +391,7 @@ static void ill_formed_programs_are_refused_by_name(void **state)
         brume_instruction instruction;
         const char *words;
     } cases[] = {
-        {{.op = BRUME_OP_COUNT, .dst = 1}, "instruction 1 has the unknown op 50"},
+        {{.op = BRUME_OP_COUNT, .dst = 1}, "instruction 1 has the unknown op 52"},
         {{.op = UINT32_MAX, .dst = 1}, "instruction 1"},
         {{.op = BRUME_OP_ADD, .dst = 64}, "instruction 1 (ADD) writes register 64"},
         {{.op = BRUME_OP_ADD, .dst = 1, .a = 64}, "instruction 1 (ADD) names register 64"},
@@ -447,7 +447,7 @@ static void programs_have_a_limit(void **state)
     struct volume_program program;
     assert_int_equal(volume_program_init(&program, &source, 0, "x"), BRUME_OK);
     struct medium_sample sample;
-    volume_program_run(&program, NULL, 1, &sample);
+    volume_program_run(&program, NULL, NULL, 1, &sample);
     assert_true(sample.sigma_s[0] == 0.0f);
     volume_program_finish(&program);
     source.instruction_count = 4097;

@@ -18,7 +18,8 @@ REC709_LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
 
 class Expression:
     """op: a name of native.OPS, or "IMAGE". number: what brume_op's line for the op names: grid,
-    table or component; for IMAGE the texture. Compared by identity: the builder shares equals."""
+    table, component or space; for IMAGE the texture. value: of a CONSTANT, or the line's own.
+    Compared by identity: the builder shares equals."""
     __slots__ = ("op", "args", "number", "value")
 
     def __init__(self, op, args=(), number=None, value=None):
@@ -229,6 +230,10 @@ class Builder:
 
     def leaf(self, op, number):
         return self._share(op, number=number)
+
+    def texture(self, op, *args, value):
+        """What only the library computes; value: what brume_op's line for the op says."""
+        return self._share(op, args, value=value)
 
     def ramp(self, table):
         """The number of a table of 256 colours."""

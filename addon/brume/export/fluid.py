@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from ..native import Grid
-from .volume import program_for
+from .volume import generated_box, program_for
 
 # RNA property and components of each attribute that Cycles knows.
 _GRIDS = {"density": ("density_grid", 1), "flame": ("flame_grid", 1),
@@ -92,4 +92,4 @@ def export(target, ob, settings, material, matrix, key):
         make = partial(Grid.create, name, data, object_from_array)
         grids.append(target.grid(("fluid", name, digest.hexdigest()), make))
     target.put("volume", key, name=ob.name, program=program, grids=grids,
-               world_from_object=matrix)
+               world_from_object=matrix, generated=generated_box(ob))

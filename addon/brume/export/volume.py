@@ -17,7 +17,7 @@ from ..native import BrumeError, vdb_list
 from . import material as materials
 from . import nodes
 from .files import grid_infos, load_grid
-from .volume_shader import compile_volume, default_program
+from .volume_shader import FOG_SPACES, SPACES, compile_volume, default_program
 
 
 def density_scale(matrix):
@@ -27,6 +27,15 @@ def density_scale(matrix):
     if length == 0.0:
         raise BrumeError("TRANSFORM", "its transform is singular.")
     return 1.0 / length
+
+
+def generated_box(ob):
+    """The corners of what an object's generated coordinates span, in its space: a mesh's texture
+    space. Those of volume objects are the same as the object's, in Cycles as well."""
+    if not isinstance(ob.data, bpy.types.Mesh):
+        return np.zeros(3), np.ones(3)
+    middle, half = (np.array(v) for v in (ob.data.texspace_location, ob.data.texspace_size))
+    return middle - half, middle + half
 
 
 def program_for(target, material, available, numbered=()):
@@ -44,7 +53,8 @@ def _compile(target, material, available, numbered):
     tree = materials.volume_tree(material)
     owner = f'Material "{material.name}"'
     return tree and compile_volume(
-        tree, available, lambda sentence: target.reports.unsupported(owner, sentence), numbered)
+        tree, available, lambda sentence: target.reports.unsupported(owner, sentence), numbered,
+        FOG_SPACES if numbered else SPACES)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -185,7 +195,7 @@ def _export_file(target, ob, matrix, key, material, file, grids_of):
                              f"are there stray voxels far away?")
     scale = density_scale(matrix) if ob.data.render.space == 'OBJECT' else 1.0
     target.put("volume", key, name=ob.name, program=program, grids=grids,
-               world_from_object=matrix, scale=scale)
+               world_from_object=matrix, scale=scale, generated=generated_box(ob))
 
 
 def export_mesh_volume(target, ob, arrays, material, matrix, key):
@@ -195,4 +205,5 @@ def export_mesh_volume(target, ob, arrays, material, matrix, key):
         target.reports.warn("GRID_UNKNOWN", f'"{ob.name}": a mesh has no grid "{name}"; it reads '
                                             f"as 0.")
     target.put("volume", key, name=ob.name, program=program, world_from_object=matrix,
-               positions=arrays["positions"], triangles=arrays["triangles"])
+               positions=arrays["positions"], triangles=arrays["triangles"],
+               generated=generated_box(ob))

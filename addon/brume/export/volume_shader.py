@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..native import OP, RAMP_SIZE, REGISTERS, BrumeError
-from . import nodes
+from . import nodes, texture
 from .expression import Builder, Unsupported
 
 # Stefan-Boltzmann constant of Cycles' principled volume, in its units.
@@ -51,19 +51,26 @@ class Medium:
 # What a program for Gaussians reads: the library gives it these two under these numbers.
 FOG_GRIDS = ("density", "color")
 
+# Where textures can be asked. Gaussians have no box of their own, the world has no lattice at all.
+SPACES = ("OBJECT", "WORLD", "GENERATED")
+FOG_SPACES = ("OBJECT", "WORLD")
+
 
 class VolumeBuilder(Builder):
     """available: names of the medium's grids; None where every name is taken on trust. numbered:
-    those whose numbers are given; the others get theirs as they are asked for."""
+    those whose numbers are given; the others get theirs as they are asked for. spaces: those
+    whose coordinates it knows."""
 
-    def __init__(self, warn, available, numbered=()):
+    def __init__(self, warn, available, numbered=(), spaces=()):
         super().__init__(warn)
         self.available = available
+        self.spaces = spaces
         self.grids = list(numbered)
         self.unknown = []
         self.unused = []
         self.handlers["ShaderNodeAttribute"] = type(self)._attribute
         self.handlers["ShaderNodeVolumeInfo"] = type(self)._volume_info
+        self.handlers.update(texture.HANDLERS)
 
     def has(self, name):
         return bool(name) and (self.available is None or name in self.available)
@@ -282,7 +289,7 @@ def _assemble(results):
                              f"the volume shader needs more than {REGISTERS} values at once")
         dst = register[id(expression)] = free.pop()
         operands = [register[id(arg)] for arg in expression.args]
-        if expression.op == "GRID":
+        if expression.op in {"GRID", "POSITION"}:
             operands = [expression.number]
         elif expression.number is not None:
             operands = [operands[0], expression.number]
@@ -304,14 +311,14 @@ def _program(builder, medium):
                    constants=constants)
 
 
-def compile_volume(tree, available, warn, numbered=()):
+def compile_volume(tree, available, warn, numbered=(), spaces=()):
     """The program of a node tree's Volume output, or None if nothing is linked there.
-    available: names of the medium's grids, empty for a mesh or a world; numbered: as
+    available: names of the medium's grids, empty for a mesh or a world; numbered and spaces: as
     VolumeBuilder."""
     place = nodes.output_place(tree, "Volume")
     if place is None or nodes.follow(place).node is None:
         return None
-    builder = VolumeBuilder(warn, available, numbered)
+    builder = VolumeBuilder(warn, available, numbered, spaces)
     return _program(builder, builder.closure(place))
 
 

@@ -55,7 +55,8 @@ link(math('MULTIPLY', density, 30.0), principled.inputs['Density'])
 clouds = staging.box('Clouds', (110.0, 80.0, 15.0), (0.0, 45.0, 22.0), material)
 clouds.display_type = 'WIRE'
 
-staging.lamp('Sun', 'SUN', (-60.0, 10.0, 34.0), (0.0, 40.0, 0.0), 7.0, (1.0, 0.86, 0.68), angle=0.02)
+staging.lamp('Sun', 'SUN', (-60.0, 10.0, 34.0), (0.0, 40.0, 0.0), 7.0, (1.0, 0.86, 0.68),
+             angle=0.02)
 staging.world((0.22, 0.42, 0.85), 0.7)
 staging.camera((0.0, -42.0, 4.0), (0.0, 10.0, 13.5), lens=26.0)
 if hasattr(bpy.context.scene, 'brume'):

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the user guide's pictures: scenes rendered by Brume, and its panels in Blender's window.
 
-    docs/images/make.py [NAME]...    all, or some: room cloud cumulus fog_lights fog_sixteen panels viewport
-                                     lpv_paths lpv_hard
+    docs/images/make.py [NAME]...    all, or some: room cloud cumulus fog_lights fog_sixteen panels
+                                     viewport lpv_paths lpv_hard
 
 Needs what scripts/setup installs, and a built library; a virtual display is its own. lpv_paths sets
 side by side what `bench/lpv.py --scenes room` left in out/bench/lpv; lpv_hard takes some minutes,

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Texture nodes of volume shaders: coordinates and noise as Blender has them. The noise's values are
-the library's; tests/data/noise.txt, which its test reads, is checked here against Blender."""
+"""Texture nodes of volume shaders: coordinates and noise as Blender has them. The noise's values
+are the library's; tests/data/noise.txt, which its test reads, is checked here against Blender."""
 
 import bpy
 import numpy as np

@@ -509,10 +509,11 @@ class Scene(Handle):
 
     def set_light(self, key, *, name, type, world_from_light, power, radius=0.0, angle=0.0,
                   size=(0.0, 0.0), spot_angle=0.0, spot_blend=0.0, spread=0.0, cast_shadow=True,
-                  camera_visible=True):
+                  camera_visible=True, factors=(1.0, 1.0, 1.0)):
+        """factors: of its light that surfaces scatter and mirror, and that volumes scatter."""
         library().scene_set_light(self.pointer, key, byref(Light(
             name.encode(), matrix(world_from_light), Vec3(*power), radius, angle, Vec2(*size),
-            spot_angle, spot_blend, spread, 1.0, 1.0, 1.0, LIGHTS[type], cast_shadow,
+            spot_angle, spot_blend, spread, *factors, LIGHTS[type], cast_shadow,
             camera_visible)))
 
     def set_world(self, *, color, image=0, image_from_world=IDENTITY, volume=None, reach=0.0):

@@ -90,6 +90,24 @@ static brume_result work_upload(struct run *run)
                          run->request->control);
 }
 
+static void warn_of_smeared(struct job_control *control, struct volume *const *volumes,
+                            uint32_t count, const struct medium_lattice *lattice)
+{
+    const struct volume *wide, *smeared = medium_smeared(volumes, count, lattice, &wide);
+    if (smeared && wide)
+        job_warn(control, "FOG_SMEARED",
+                 "\"%s\": most of its balls of fog are smaller than the volumes' cells of %.3g m "
+                 "and smeared over them; \"%s\" makes the box of all volumes more than twice as "
+                 "long",
+                 smeared->name, (double)lattice->cell, wide->name);
+    else if (smeared)
+        job_warn(control, "FOG_SMEARED",
+                 "\"%s\": most of its balls of fog are smaller than the volumes' cells of %.3g m "
+                 "and smeared over them; a higher volume resolution shows "
+                 "them, or are there stray balls far away?",
+                 smeared->name, (double)lattice->cell);
+}
+
 static brume_result work_medium(struct run *run)
 {
     const struct render_request *request = run->request;
@@ -107,6 +125,8 @@ static brume_result work_medium(struct run *run)
         medium_build(volumes, table->count, wanted < useful ? wanted : useful,
                      run->renderer->shares.medium / MEDIUM_CELL_BYTES,
                      job_cancelled_callback, request->control, &lattice);
+    if (result == BRUME_OK)
+        warn_of_smeared(request->control, volumes, table->count, &lattice);
     free(volumes);
     if (result == BRUME_OK)
         result = medium_sharpen(&lattice);

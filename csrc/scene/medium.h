@@ -53,6 +53,13 @@ struct medium_lattice {
  * which any resolution makes better. */
 int32_t medium_useful_resolution(struct volume *const *volumes, uint32_t count);
 
+/* A volume most of whose Gaussians are narrower than the lattice's cells, so that they are smeared
+ * over these, or NULL. Into *wide another without which the box of all would be half as long at
+ * most, or NULL. */
+const struct volume *medium_smeared(struct volume *const *volumes, uint32_t count,
+                                    const struct medium_lattice *lattice,
+                                    const struct volume **wide);
+
 /* resolution: cells along the longest side of the volumes' joint bounds. max_cells: a limit that
  * makes it coarser. cancelled (may be NULL): polled; a true return ends with BRUME_E_CANCELLED.
  * Values are means over the cell: a lattice coarser than the grid does not lose mass, a finer one

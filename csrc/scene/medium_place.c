@@ -21,15 +21,19 @@ static double set_dims(struct medium_lattice *lattice, const double extent[3], d
     return product;
 }
 
-/* The box of all volumes; returns its longest side, 0 where none reaches anywhere. */
-static double joint_bounds(struct volume *const *volumes, uint32_t count, double lower[3],
-                           double upper[3], double extent[3])
+/* The box of all volumes but one, or of all; returns its longest side, 0 where none reaches
+ * anywhere. */
+static double joint_bounds(struct volume *const *volumes, uint32_t count,
+                           const struct volume *without, double lower[3], double upper[3],
+                           double extent[3])
 {
     double longest = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         lower[axis] = INFINITY;
         upper[axis] = -INFINITY;
         for (uint32_t i = 0; i < count; ++i) {
+            if (volumes[i] == without)
+                continue;
             lower[axis] = fmin(lower[axis], (double)volumes[i]->lower[axis]);
             upper[axis] = fmax(upper[axis], (double)volumes[i]->upper[axis]);
         }
@@ -124,7 +128,7 @@ static int32_t useful_resolution(const struct voxels *voxels, double longest)
 int32_t medium_useful_resolution(struct volume *const *volumes, uint32_t count)
 {
     double lower[3], upper[3], extent[3];
-    const double longest = joint_bounds(volumes, count, lower, upper, extent);
+    const double longest = joint_bounds(volumes, count, NULL, lower, upper, extent);
     const struct voxels voxels = finest_voxels(volumes, count);
     return useful_resolution(&voxels, longest);
 }
@@ -157,7 +161,7 @@ void medium_place(struct medium_lattice *lattice, struct volume *const *volumes,
                   int32_t resolution, uint64_t max_cells)
 {
     double lower[3], upper[3], extent[3];
-    const double longest = joint_bounds(volumes, count, lower, upper, extent);
+    const double longest = joint_bounds(volumes, count, NULL, lower, upper, extent);
     /* Also false for a box so small that floats have no cells for it. */
     if (!((float)(longest / resolution) > 0.0f))
         return;
@@ -182,4 +186,58 @@ void medium_place(struct medium_lattice *lattice, struct volume *const *volumes,
         lattice->lower[axis] = (float)(middle - half);
         lattice->upper[axis] = (float)(middle + half);
     }
+}
+
+/* --- Fog too fine for it -------------------------------------------------------------------- */
+
+/* Whether most of its Gaussians are narrower than a cell: 2 / scale is their radius, with 2 % of
+ * the peak left there. */
+static bool is_smeared(const struct volume *volume, double cell)
+{
+    uint32_t narrow = 0;
+    for (uint32_t i = 0; i < volume->gaussian_count; ++i) {
+        double center[3];
+        narrow += 2.0 / gaussian_place(&volume->gaussians[i], volume->world_from_object, center) <
+                  cell;
+    }
+    return narrow > volume->gaussian_count / 2;
+}
+
+/* The volume, other than that one, without which the box would be shortest, if half as long at most.
+ * Only those on its sides can be. */
+static const struct volume *widening(struct volume *const *volumes, uint32_t count,
+                                     const struct volume *that)
+{
+    double lower[3], upper[3], extent[3], rest[3][3];
+    const struct volume *found = NULL;
+    double least = 0.5 * joint_bounds(volumes, count, NULL, lower, upper, extent);
+    for (int side = 0; side < 6; ++side)
+        for (uint32_t i = 0; i < count; ++i) {
+            const struct volume *volume = volumes[i];
+            const int axis = side / 2;
+            if (side % 2 ? (double)volume->upper[axis] < upper[axis]
+                         : (double)volume->lower[axis] > lower[axis])
+                continue;
+            const double without =
+                joint_bounds(volumes, count, volume, rest[0], rest[1], rest[2]);
+            if (volume != that && without > 0.0 && without <= least) {
+                least = without;
+                found = volume;
+            }
+            break; /* another on the same side keeps the box as long */
+        }
+    return found;
+}
+
+const struct volume *medium_smeared(struct volume *const *volumes, uint32_t count,
+                                    const struct medium_lattice *lattice,
+                                    const struct volume **wide)
+{
+    *wide = NULL;
+    for (uint32_t i = 0; i < count; ++i)
+        if (is_smeared(volumes[i], lattice->cell)) {
+            *wide = widening(volumes, count, volumes[i]);
+            return volumes[i];
+        }
+    return NULL;
 }

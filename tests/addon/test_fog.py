@@ -538,6 +538,27 @@ def test_unknown_attributes(scene, export, target):
     assert target.reports.ids() == ["ATTRIBUTE_UNKNOWN"] * 2
 
 
+def test_a_radius_of_faces_is_named(scene, export, target):
+    ob = dust(faces=[(0, 1, 2)])
+    attribute(ob, "radius", (0.25,), 'FLOAT', 'FACE')
+    source(ob, 'POINTS')
+    np.testing.assert_allclose(gaussians(export())[:, SCALE], 2.0)
+    assert target.reports.ids() == ["ATTRIBUTE_UNKNOWN"]
+
+
+def test_a_bare_curve_is_fog_along_its_points(scene, export, target):
+    bpy.ops.curve.primitive_bezier_circle_add(radius=2.0)
+    ob = bpy.context.object
+    source(ob, 'POINTS', radius=0.5)
+    found = gaussians(export())
+    assert len(found) > 12
+    np.testing.assert_allclose(np.linalg.norm(found[:, :3], axis=1), 2.0, atol=0.01)
+    ob.data.bevel_depth = 0.1  # now its surface has points, more of them
+    bpy.context.view_layer.update()
+    assert len(gaussians(export())) > 4 * len(found)
+    assert not target.reports.ids()
+
+
 def test_a_flat_instance_costs_only_itself(scene, export, target):
     collection = bpy.data.collections.new("Group")
     ob = emitter(count=9, end=1, scale=(1, 1, 0))

@@ -53,6 +53,17 @@ def test_lamp(scene, export, kind, values, wanted):
             close(block[name], value)
 
 
+@pytest.mark.parametrize("number, flag", enumerate((
+    "visible_diffuse", "visible_glossy", "visible_volume_scatter")))
+def test_what_a_lamp_reaches(scene, export, number, flag):
+    ob = add("Lamp", lamp('POINT'))
+    assert export().named("light", "Lamp")["factors"] == (1, 1, 1)
+    setattr(ob, flag, False)
+    wanted = [1.0] * 3
+    wanted[number] = 0.0
+    assert export().named("light", "Lamp")["factors"] == tuple(wanted)
+
+
 @pytest.mark.normalize
 @pytest.mark.parametrize("kind, values, factor", [
     ('POINT', {"shadow_soft_size": 0.0}, 4.0),

@@ -709,9 +709,38 @@ static void a_volume_keeps_its_own_copy(void **state)
     volume_release(volume);
 }
 
+/* Cells that have become larger than most balls, and what made them so. */
+static void balls_smaller_than_cells_are_told(void **state)
+{
+    (void)state;
+    brume_gaussian dust[9], stray = white(0, 0, -60, 8, 1), wide = white(0, 0, 0, 0.5f, 1);
+    for (int i = 0; i < 9; ++i)
+        dust[i] = white((float)(i % 3), (float)(i / 3), 0, 8, 1); /* a radius of 0.25 m */
+    struct volume *volumes[] = {gaussians_make(&wide, 1), gaussians_make(dust, 9),
+                                gaussians_make(&stray, 1)};
+    const struct {
+        uint32_t first, count;
+        int32_t resolution;
+        int smeared, wide;
+    } cases[] = {{1, 1, 40, -1, -1}, {1, 1, 8, 1, -1}, {1, 2, 40, 1, 2}, {0, 2, 40, 1, 0},
+                 {0, 1, 8, -1, -1},  {0, 0, 8, -1, -1}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        struct volume **some = volumes + cases[i].first;
+        const struct volume *larger;
+        struct medium_lattice lattice = build(some, cases[i].count, cases[i].resolution);
+        const struct volume *smeared = medium_smeared(some, cases[i].count, &lattice, &larger);
+        assert_ptr_equal(smeared, cases[i].smeared < 0 ? NULL : volumes[cases[i].smeared]);
+        assert_ptr_equal(larger, cases[i].wide < 0 ? NULL : volumes[cases[i].wide]);
+        medium_finish(&lattice);
+    }
+    for (int i = 0; i < 3; ++i)
+        volume_release(volumes[i]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(balls_smaller_than_cells_are_told),
         cmocka_unit_test(the_mass_is_kept_at_any_size),
         cmocka_unit_test(a_speck_on_a_corner_is_shared_by_eight_cells),
         cmocka_unit_test(specks_at_the_ends_of_the_lattice_stay_in_it),

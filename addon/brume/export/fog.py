@@ -22,6 +22,10 @@ _ATTRIBUTES = {'FLOAT': ("value", 1), 'INT': ("value", 1), 'INT8': ("value", 1),
                'FLOAT_COLOR': ("color", 4), 'BYTE_COLOR': ("color", 4)}
 
 
+# Of these Blender makes a mesh beside them, unless they are bare lines.
+_LINES = {'CURVE', 'SURFACE', 'FONT'}
+
+
 class _Points(NamedTuple):
     """Where the Gaussians are and what differs between them; None where nothing does."""
     positions: np.ndarray
@@ -35,7 +39,7 @@ def numbers(ob, own, shown):
     is the object's, not what modifiers made beside it; shown: whether it is itself seen."""
     def applies(source):
         if source.source == 'POINTS':
-            return shown and ob.type in {'MESH', 'POINTCLOUD', 'EMPTY'}
+            return shown and ob.type in {'MESH', 'POINTCLOUD', 'EMPTY'} | _LINES
         return own and (shown or source.source == 'PARTICLES')
     return [number for number, source in enumerate(ob.brume.fog_sources)
             if source.enabled and applies(source)]
@@ -90,14 +94,31 @@ class _Reader:
             return None
         if self.ob.type == 'POINTCLOUD':
             return self.points_of(self.ob.data, self.ob.data.points)
+        if self.ob.type in _LINES:
+            return self.line()
         with mesh.evaluated(self.ob) as data:
             return self.points_of(data, data.vertices)
+
+    def line(self):
+        """The points of a line without a surface; the vertices of a surface come as a mesh's."""
+        try:
+            data = self.ob.to_mesh()
+            if data is None or len(data.polygons):
+                return None
+            return self.points_of(data, data.vertices)
+        finally:
+            self.ob.to_mesh_clear()
 
     def points_of(self, data, points):
         count = len(points)
         if not count:
             return None
-        sizes = _values(data, data.attributes.get("radius"), count)
+        radius = data.attributes.get("radius")
+        sizes = _values(data, radius, count)
+        if radius is not None and sizes is None:
+            self.target.reports.warn(
+                "ATTRIBUTE_UNKNOWN", f'Object "{self.ob.name}": attribute "radius" has no number '
+                f'for each point or corner; the fog "{self.source.name}" takes 1 m.')
         color, along = self.source.color_attribute, self.source.factor_attribute
         return _Points(
             positions(data, points),

@@ -39,10 +39,16 @@ def _shape(light):
             "spread": light.spread}
 
 
+def _reaches(ob):
+    """Whether it lights what scatters diffusely, mirrors and fills: Cycles' ray visibility."""
+    return ob.visible_diffuse, ob.visible_glossy, ob.visible_volume_scatter
+
+
 def export(target, ob, matrix, persistent_id=(), camera_visible=True):
     """Puts one lamp; matrix is the instance's, by rows."""
     key = key_of_datablock(ob, *persistent_id)
-    stamp = compat.identity(ob.data), ob.name, matrix.tobytes(), camera_visible
+    stamp = (compat.identity(ob.data), ob.name, matrix.tobytes(), camera_visible,
+             _reaches(ob))
     # A lamp's identity changes with its type, of which its object tells.
     reads = nodes.identities(ob.data) | {compat.identity(ob)}
     target.part(("light", key), stamp, reads,
@@ -67,5 +73,6 @@ def _export(target, ob, matrix, key, camera_visible):
         power = np.maximum(power, 0.0)
     target.put("light", key, name=ob.name,
                world_from_light=matrix, power=tuple(power.tolist()),
+               factors=tuple(map(float, _reaches(ob))),
                cast_shadow=bool(compat.light_casts_shadow(light)),
                camera_visible=bool(camera_visible and compat.light_is_seen(light)), **_shape(light))

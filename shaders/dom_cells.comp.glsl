@@ -8,6 +8,7 @@
 #include "lib/walls.glsl"
 #include "lib/harmonics.glsl"
 #include "lib/lines.glsl"
+#include "lib/cuts.glsl"
 
 layout(local_size_x = GROUP_LANES, local_size_y = GROUP_CELLS, local_size_z = GROUP_CELLS) in;
 
@@ -31,18 +32,25 @@ layout(binding = SLOT_OUTPUT_FIELD + 2, rgba16f) writeonly uniform image3D emiss
 layout(location = 0) uniform float brightest; // emission of a surface
 
 const int POINTS = 6; // along a cell, at most
+const uint ALL_LINKS = (1u << 26) - 1u;
 
 uint lines_of(ivec3 cell, int number)
 {
     return texelFetch(lines, lines_texel(cell, number), 0).r;
 }
 
+bool glows(ivec3 cell)
+{
+    return lines_of(cell, LINE_EMISSION) != 0u;
+}
+
 // How much of a cell's links is closed, as closed_share() wants it: of the lines from points that the cell's
 // middle sees to points that its neighbour's sees. What parts others from these is not in the way, but beside
-// it, unless the link itself is cut: then they are behind what cuts it.
+// it, unless the link itself is cut: then they are behind what cuts it. What glows is never rounded to nothing.
 uvec2 closed_links(ivec3 cell, uint parted)
 {
     uvec2 closed = uvec2(0u);
+    bool glows_here = glows(cell);
     for (int i = 0; i < 26; ++i) {
         ivec3 next = i < 13 ? cell + LINKS[i] : cell - LINKS[i - 13];
         uint there = lines_of(next, LINE_PARTED), cut = lines_of(i < 13 ? cell : next, i % 13);
@@ -50,9 +58,29 @@ uvec2 closed_links(ivec3 cell, uint parted)
         uint told = POINTS_ACROSS[i % 13] & ~(blocked ? parted & there : parted | there);
         float share = float(bitCount(told & (cut | parted | there))) / float(bitCount(told));
         uint thirds = uint(round(3.0 * share));
+        if (thirds == 0u && share > 0.0 && (glows_here || glows(next)))
+            thirds = 1u;
         closed |= uvec2(thirds & 1u, thirds >> 1) << i;
     }
     return closed;
+}
+
+// Of what surfaces send into a cell over its closed links and it passes on, the part that they would by the
+// lines that they cut: thirds say little of small things, nor do they tell that what is on both sides of the
+// cell's middle hides itself.
+float true_part(ivec3 cell, uvec2 closed)
+{
+    float looks = 0.0, sends = 0.0;
+    for (int i = 0; i < 13; ++i) {
+        // By the solid angle of the direction, and how dense its lines are across it.
+        float weight = WEIGHTS[link_class(i)] / link_length(i);
+        uint ahead = POINTS_ACROSS[i] & lines_of(cell, i);
+        uint behind = POINTS_ACROSS[i] & lines_of(cell - LINKS[i], i);
+        float there = closed_share(closed, 1u << i), back = closed_share(closed, 1u << (i + 13));
+        looks += weight * float(bitCount(ahead ^ behind)) / float(bitCount(POINTS_ACROSS[i]));
+        sends += weight * (there * (1.0 - back) + back * (1.0 - there));
+    }
+    return sends > 0.0 ? looks / sends : 0.0;
 }
 
 // Of surfaces so small that no link's middle meets them.
@@ -96,7 +124,14 @@ void main()
     bool met = walls_met(cell) > 0u;
     vec3 reflectance = met ? mean_of_walls(cell, 0) : line_surface(cell, LINE_REFLECTANCE);
     vec3 emission = met ? mean_of_walls(cell, WALL_EMISSION) : line_surface(cell, LINE_EMISSION);
+    uvec2 closed = closed_links(cell, parted);
+    if (emission != vec3(0.0)) {
+        float part = true_part(cell, closed);
+        emission *= part;
+        // What meets the rest goes on, if by way of all closed links: even light stays even.
+        reflectance = clamp(1.0 - part * (1.0 - reflectance), 0.0, 1.0);
+    }
     imageStore(cell_image[2], cell, vec4(reflectance, 0.0));
     imageStore(emission_image, cell, vec4(min(emission * brightest, vec3(65504.0)), 0.0));
-    imageStore(cuts_image, cell, uvec4(cuts, closed_links(cell, parted), parted));
+    imageStore(cuts_image, cell, uvec4(cuts, closed, parted));
 }

@@ -60,7 +60,7 @@ def test_what_is_not_known_has_a_sentence(scene):
         return n.node("TexNoise", Vector=n.node("TexCoord", None).outputs["Window"])
 
     def other(n):
-        coordinates = n.node("TexCoord", None, object=add("Empty", None))
+        coordinates = n.node("TexCoord", None, object=add("Empty", None, scale=(1, 0, 1)))
         return n.node("TexNoise", Vector=coordinates.outputs["Object"])
 
     def turned(n):
@@ -101,7 +101,7 @@ def glow(scene, render, build, **place):
     """Columns of a picture of a box of 2 m, seen from the front, that emits build(nodes)."""
     lit(scene)
     for ob in list(scene.objects):
-        if ob.type != 'CAMERA':
+        if ob.type not in {'CAMERA', 'EMPTY'}:
             bpy.data.objects.remove(ob)
     owner, nodes = material("Glow")
     nodes.volume(nodes.node("Emission", Color=(1, 1, 1, 1), Strength=build(nodes)))
@@ -118,16 +118,22 @@ def test_pictures_of_coordinates(scene, render):
 
     def along(node, output):
         def build(n):
-            position = n.node(node, None).outputs[output]
+            if node is other:
+                node_of = n.node("TexCoord", None, object=other)
+            else:
+                node_of = n.node(node, None)
+            position = node_of.outputs[output]
             x = n.node("SeparateXYZ", Vector=position)
             return n.node("Math", operation='ADD', Value=x, Value_001=5.0)
         return build
     # A box half as large, twice its size: its middle is 0.25 to the right in the world.
     box = {"size": 1.0, "scale": (2, 2, 2), "location": (0.25, 0, 0)}
     inside = slice(3, -1)
+    other = add("Empty", None, location=(0.5, 0, 0), scale=(-2, 1, 1))
     for node, output, expected in (("TexCoord", "Object", (middles - 0.25) / 2.0),
                                    ("TexCoord", "Generated", (middles - 0.25) / 2.0 + 0.5),
-                                   ("NewGeometry", "Position", middles)):
+                                   ("NewGeometry", "Position", middles),
+                                   (other, "Object", (middles - 0.5) / -2.0)):
         found = glow(scene, render, along(node, output), **box) - 5.0
         np.testing.assert_allclose(found[inside], expected[inside], atol=0.02)
 
@@ -166,6 +172,22 @@ def test_a_texture_follows_its_mesh_s_box(scene, export):
     cube("Fog", size=3.0, material=owner, scale=(2, 1, 1))
     volume, = export().of("volume")
     np.testing.assert_allclose(volume["generated"], ((-1.5,) * 3, (1.5,) * 3), atol=1e-6)
+
+
+def test_a_texture_goes_with_its_object(scene, export, recorder):
+    owner, nodes = material("Fog")
+    empty = add("Empty", None)
+    coordinates = nodes.node("TexCoord", None, object=empty)
+    nodes.volume(nodes.node("VolumeScatter", Density=nodes.node(
+        "TexNoise", Vector=coordinates.outputs["Object"])))
+    cube("Fog", material=owner)
+    before = export().of("volume")[0]["program"].instructions
+    recorder.sent.clear()
+    export()
+    assert "volume" not in recorder.sent
+    empty.location.x = 1.0
+    bpy.context.view_layer.update()
+    assert export().of("volume")[0]["program"].instructions != before
 
 
 # ------------------------------------------------------------------------------------------------

@@ -80,7 +80,8 @@ def output_source(tree, identifier):
 
 
 def identities(owner):
-    """Of a material, world or lamp and of all node groups that it is made of."""
+    """Of a material, world or lamp, of all node groups that it is made of, and of the objects whose
+    coordinates it asks for."""
     found, trees = {identity(owner)}, [owner.node_tree]
     while trees:
         tree = trees.pop()
@@ -89,6 +90,8 @@ def identities(owner):
             if group and identity(group) not in found:
                 found.add(identity(group))
                 trees.append(group)
+            if node.bl_idname == 'ShaderNodeTexCoord' and node.object:
+                found.add(identity(node.object))
     return found
 
 

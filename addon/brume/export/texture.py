@@ -22,8 +22,19 @@ def _coordinates(builder, source):
     if name not in {"Generated", "Object"}:
         raise Unsupported(f"{nodes.label(node)}'s {name}")
     if name == "Object" and node.object:
-        raise Unsupported(f"{nodes.label(node)} with the object {node.object.name}")
+        return _object_position(builder, source, node.object)
     return _position(builder, source, name.upper())
+
+
+def _object_position(builder, source, ob):
+    """In another object's space."""
+    try:
+        from_world = np.linalg.inv(np.array(ob.matrix_world))
+    except np.linalg.LinAlgError as error:
+        raise Unsupported(f"{nodes.label(source.node)} with {ob.name}, which has a scale of "
+                          f"zero,") from error
+    return builder.op("ADD", _times(builder, from_world[:3, :3],
+                                    _position(builder, source, "WORLD")), from_world[:3, 3])
 
 
 def _geometry(builder, source):

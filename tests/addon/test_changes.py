@@ -153,6 +153,25 @@ EDITS = {
 }
 
 
+def test_textures_follow_what_they_ask(viewport):
+    """Where an object is whose coordinates a volume's texture is at, and its own mesh's box."""
+    owner, nodes = material("Drifts")
+    empty = add("Empty", None)
+    coordinates = nodes.node("TexCoord", None, object=empty)
+    at = nodes.node("VectorMath", Vector=coordinates.outputs["Object"],
+                    Vector_001=coordinates.outputs["Generated"])
+    nodes.volume(nodes.node("VolumeScatter", Density=nodes.node("TexNoise", Vector=at)))
+    box = cube("Drifts", material=owner)
+    viewport.export()
+    empty.location.x = 1.0
+    assert viewport.export() == ["volume"]
+    assert not differences(viewport)
+    box.data.vertices[0].co *= 1.5
+    box.data.update()
+    assert "volume" in viewport.export()
+    assert not differences(viewport)
+
+
 @pytest.mark.parametrize("edit", EDITS)
 def test_an_edit_sends_what_changed(studio, viewport, edit):
     viewport.export()

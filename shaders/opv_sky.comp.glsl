@@ -32,7 +32,7 @@ void main()
         gpu_light_sample s = light_sample_at(frame.world.x + i);
         vec3 towards = s.position.xyz;
         int first = int(s.position.w);
-        if (first >= 0 && shadow_medium(first, first + int(frame.world.w) - 1, p, 1.0) == 0.0)
+        if (first >= 0 && shadow_medium(first, first + int(frame.world.w) - 1, p, 1.5) == 0.0)
             continue;
         vec3 light = s.weight.rgb * distant_transmittance(p, towards, step_length, 0.5) *
                      float(every);

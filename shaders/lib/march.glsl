@@ -206,7 +206,7 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, b
     if (m.sigma_s == vec3(0.0))
         intensity = vec3(0.0);
     if (intensity != vec3(0.0))
-        intensity *= light_shadow_medium(lamp.light, lamp.light_sample, p, distance);
+        intensity *= light_shadow_medium(lamp.light, lamp.light_sample, p);
     vec3 sum = vec3(0.0);
     if (intensity != vec3(0.0)) {
         float cosine = dot(towards, ray.direction);

@@ -46,9 +46,10 @@ vec2 shadow_texel(gpu_shadow_view view, vec2 uv, float rim)
 // The maps are from first to last: where one does not reach, the next is asked. In loops, so that software
 // does not ask all. Beyond all of them all is lit.
 
-// A point of a medium has no normal to tell how surfaces lie: near one it stays clear of the depths that a
-// texel of the map rounds.
-float shadow_medium(int first, int last, vec3 p, float distance)
+// A point of a medium has no normal to tell how surfaces lie. Near one a texel's depth is as often too near as
+// too far, and left at that: fog that is dark right before a lit wall is not seen, light right behind a dark
+// one is. What may lie on a surface stays `clear` of it, in sizes of a texel.
+float shadow_medium(int first, int last, vec3 p, float clear)
 {
     do {
         gpu_shadow_view view = shadow_view(first);
@@ -57,7 +58,7 @@ float shadow_medium(int first, int last, vec3 p, float distance)
             continue;
         ivec2 texel = ivec2(shadow_texel(view, place.xy, 0.5));
         float depth = texelFetch(shadow_maps, ivec3(texel, int(view.tile.w)), 0).r;
-        return shadow_distance(view, depth) < place.z - 1.5 * view.range.w * distance ? 0.0 : 1.0;
+        return shadow_distance(view, depth) < place.z - clear * view.range.w ? 0.0 : 1.0;
     } while (++first <= last);
     return 1.0;
 }
@@ -143,11 +144,10 @@ float light_shadow(gpu_light light, gpu_light_sample s, vec3 p, vec3 normal)
     return shadow_surface(first, last, p, distance, normal, v / distance);
 }
 
-// distance: how far a lamp is from p, of no account for suns.
-float light_shadow_medium(gpu_light light, gpu_light_sample s, vec3 p, float distance)
+float light_shadow_medium(gpu_light light, gpu_light_sample s, vec3 p)
 {
     int first, last;
     if (!maps_of(light, s, p, first, last))
         return 1.0;
-    return shadow_medium(first, last, p, light.info.x == uint(LIGHT_SUN) ? 1.0 : distance);
+    return shadow_medium(first, last, p, 0.0);
 }

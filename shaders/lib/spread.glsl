@@ -126,7 +126,7 @@ light_path path_into(gpu_light light, gpu_light_sample s, int number, int paths,
     }
     path.intensity *= light.factors.z;
     if (path.intensity != vec3(0.0))
-        path.intensity *= light_shadow_medium(light, s, path.p, path.distance);
+        path.intensity *= light_shadow_medium(light, s, path.p);
     return path;
 }
 

@@ -48,7 +48,7 @@ link(inside.outputs['Generated'], split.inputs[0])
 up = split.outputs['Z']
 threshold = math('MULTIPLY_ADD', up, 0.24, 0.47)
 base = math('MINIMUM', math('MULTIPLY', up, 10.0), 1.0)
-density = math('MULTIPLY', math('MAXIMUM', math('SUBTRACT', noise.outputs['Fac'], threshold), 0.0),
+density = math('MULTIPLY', math('MAXIMUM', math('SUBTRACT', noise.outputs[0], threshold), 0.0),
                base)
 principled = next(n for n in tree.nodes if n.bl_idname == 'ShaderNodeVolumePrincipled')
 link(math('MULTIPLY', density, 30.0), principled.inputs['Density'])

@@ -32,7 +32,6 @@ layout(binding = SLOT_OUTPUT_FIELD + 2, rgba16f) writeonly uniform image3D emiss
 layout(location = 0) uniform float brightest; // emission of a surface
 
 const int POINTS = 6; // along a cell, at most
-const uint ALL_LINKS = (1u << 26) - 1u;
 
 uint lines_of(ivec3 cell, int number)
 {
@@ -83,6 +82,33 @@ float true_part(ivec3 cell, uvec2 closed)
     return sends > 0.0 ? looks / sends : 0.0;
 }
 
+// The links that are cut, of all 26.
+uint cuts_of(ivec3 cell)
+{
+    uint cuts = texelFetch(links, links_texel(cell), 0).r;
+    for (int i = 0; i < 13; ++i)
+        cuts |= (texelFetch(links, links_texel(cell - LINKS[i]), 0).r >> i & 1u) << (13 + i);
+    return cuts;
+}
+
+// A wall cuts nine links or more of the cells next to it, and not all; what is smaller than a cell fewer, or,
+// around a cell's middle, all of them.
+bool cut_by_little(uint cuts)
+{
+    int count = bitCount(cuts);
+    return count <= 8 || count == 26;
+}
+
+// Whether the surfaces that a cell knows are of such things alone.
+bool are_small(ivec3 cell, uint cuts)
+{
+    bool small = cut_by_little(cuts);
+    for (int i = 0; i < 26 && small; ++i)
+        if ((cuts >> i & 1u) != 0u)
+            small = cut_by_little(cuts_of(i < 13 ? cell + LINKS[i] : cell - LINKS[i - 13]));
+    return small;
+}
+
 // Of surfaces so small that no link's middle meets them.
 vec3 line_surface(ivec3 cell, int number)
 {
@@ -109,9 +135,7 @@ void main()
         g_sum += part * g * luminance(frame.fog_sigma_s.rgb);
         g_weight += part * luminance(frame.fog_sigma_s.rgb);
     }
-    uint cuts = texelFetch(links, links_texel(cell), 0).r;
-    for (int i = 0; i < 13; ++i)
-        cuts |= (texelFetch(links, links_texel(cell - LINKS[i]), 0).r >> i & 1u) << (13 + i);
+    uint cuts = cuts_of(cell);
     extinct = clamp(extinct, vec3(0.0), vec3(65504.0));
     imageStore(cell_image[0], cell, fit(extinct, 0.0));
     vec3 albedo = clamp(scatter / max(extinct, vec3(1e-12)), 0.0, 1.0);
@@ -125,10 +149,10 @@ void main()
     vec3 reflectance = met ? mean_of_walls(cell, 0) : line_surface(cell, LINE_REFLECTANCE);
     vec3 emission = met ? mean_of_walls(cell, WALL_EMISSION) : line_surface(cell, LINE_EMISSION);
     uvec2 closed = closed_links(cell, parted);
-    if (emission != vec3(0.0)) {
+    if (emission != vec3(0.0) && are_small(cell, cuts)) {
         float part = true_part(cell, closed);
         emission *= part;
-        // What meets the rest goes on, if by way of all closed links: even light stays even.
+        // What meets the rest goes on, if by way of all closed links.
         reflectance = clamp(1.0 - part * (1.0 - reflectance), 0.0, 1.0);
     }
     imageStore(cell_image[2], cell, vec4(reflectance, 0.0));

@@ -97,7 +97,7 @@ static void warn_of_smeared(struct job_control *control, struct volume *const *v
     if (smeared && wide)
         job_warn(control, "FOG_SMEARED",
                  "\"%s\": most of its balls of fog are smaller than the volumes' cells of %.3g m "
-                 "and smeared over them; \"%s\" makes the box of all volumes more than twice as "
+                 "and smeared over them; \"%s\" makes the box of all volumes at least twice as "
                  "long",
                  smeared->name, (double)lattice->cell, wide->name);
     else if (smeared)

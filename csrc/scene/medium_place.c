@@ -121,7 +121,7 @@ static struct voxels finest_voxels(struct volume *const *volumes, uint32_t count
 static int32_t useful_resolution(const struct voxels *voxels, double longest)
 {
     const double cells = ceil(longest / voxels->side - SLIVER);
-    /* Also where a mesh, with voxels of no size, makes it infinite. */
+    /* Also where a mesh or a texture, with voxels of no size, makes it infinite. */
     return cells < INT32_MAX ? (int32_t)fmax(cells, 1.0) : INT32_MAX;
 }
 

@@ -19,7 +19,7 @@ struct noise {
 #define NOISE_OCTAVES 15
 
 /* At a point, of which the first `dimensions` coordinates count. out[0]: Blender's Fac; with `color`
- * all three of its Color, else the same in all. Finite for finite points. */
+ * all three of its Color, else the same in all. Not finite where the sum of the octaves is not. */
 void noise_at(const struct noise *noise, const float point[4], bool color, float out[3]);
 
 #endif

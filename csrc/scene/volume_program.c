@@ -203,10 +203,11 @@ static brume_result check_instruction(const brume_volume_program *program, uint3
     if (instruction->op == BRUME_OP_POSITION && instruction->a >= BRUME_SPACE_COUNT)
         return fail(BRUME_E_SHADER_PROGRAM, "volume '%s': %s names space %u of %d", volume_name,
                     what, instruction->a, BRUME_SPACE_COUNT);
+    const float dimensions = instruction->value[0];
     if (instruction->op == BRUME_OP_NOISE &&
-        !(instruction->value[0] >= 1.0f && instruction->value[0] <= 4.0f))
+        !(dimensions >= 1.0f && dimensions <= 4.0f && dimensions == truncf(dimensions)))
         return fail(BRUME_E_SHADER_PROGRAM, "volume '%s': %s has %g dimensions, not 1 to 4",
-                    volume_name, what, (double)instruction->value[0]);
+                    volume_name, what, (double)dimensions);
     if (instruction->dst >= BRUME_REGISTERS)
         return fail(BRUME_E_SHADER_PROGRAM,
                     "volume '%s': %s writes register %u, but there are only %u", volume_name, what,

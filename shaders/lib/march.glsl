@@ -41,22 +41,22 @@ struct march_state
     vec3 transmittance;
 };
 
-// Mean of 1/d^2 over [t0, t1] of a ray whose nearest approach to a point, at distance h, is at
+// Mean of 1/d^2 over dt of a ray, from t0 on, whose nearest approach to a point, at distance h, is at
 // t = 0: the exact integral, so that a lamp in the fog makes no bright cell and no banding. Turns
 // `within`, a place in the step, 0 to 1, into one that is as likely as 1/d^2 is large: what else varies
 // counts where the light is (Kulla and Fajardo, "Importance Sampling Techniques for Path Tracing in
-// Participating Media", EGSR 2012, sec. 4.1).
-float mean_inverse_square(float t0, float t1, float h, inout float within)
+// Participating Media", EGSR 2012, sec. 4.1). `uneven`: how far the least 1/d^2 is from the greatest, 0 to 1.
+float mean_inverse_square(float t0, float dt, float h, inout float within, out float uneven)
 {
-    float x = t0 / h, y = t1 / h;
-    // atan(y) - atan(x), without cancellation far from the lamp.
-    float angle = atan((y - x), 1.0 + x * y);
-    if (angle < 0.0)
-        angle += PI;
-    // tan(atan(x) + within * angle) - x, likewise
-    float turned = tan(within * angle);
-    within = clamp(turned * (1.0 + x * x) / ((1.0 - x * turned) * (y - x)), 0.0, 1.0);
-    return angle / (h * (t1 - t0));
+    float x = t0 / h, wide = dt / h;
+    float begins = 1.0 + x * x, ends = 1.0 + (x + wide) * (x + wide);
+    uneven = 1.0 - min(begins, ends) / max(begins, ends);
+    // atan(x + wide) - atan(x), without cancellation far from the lamp.
+    float angle = atan(wide, 1.0 + x * (x + wide));
+    // tan(atan(x) + within * angle) - x, likewise; of small angles no driver need know the tangent well.
+    float part = within * angle, turned = part < 0.1 ? part + part * part * part / 3.0 : tan(part);
+    within = clamp(turned * begins / ((1.0 - x * turned) * wide), 0.0, 1.0);
+    return angle / (h * dt);
 }
 
 // The distance from the ray that mean_inverse_square wants, and in `along` the point's place on the
@@ -88,6 +88,12 @@ void look_up_scatter(vec3 p, bool in_lattice, inout medium_step m)
     m.g = scatter.a;
     if (fog_exists())
         add_fog(m.sigma_s, m.g);
+}
+
+vec3 look_up_extinct(vec3 p, bool in_lattice)
+{
+    vec3 sigma_t = in_lattice ? textureLod(medium_extinct, medium_coordinate(p), 0.0).rgb : vec3(0.0);
+    return fog_exists() ? sigma_t + frame.fog_sigma_t.rgb : sigma_t;
 }
 
 // The rest of it. False where the step is in an empty brick; `skipped` more steps then are too.
@@ -124,6 +130,12 @@ vec3 step_weight(vec3 sigma_t, vec3 through, float dt)
 {
     return mix((1.0 - through) / max(sigma_t, vec3(1e-12)), vec3(dt),
                lessThan(sigma_t * dt, vec3(1e-4)));
+}
+
+// The same where the place that the step is seen at was chosen: that goes with how far the light of it comes.
+vec3 step_weight_at(vec3 sigma_t, vec3 through, float dt, float within, float chosen)
+{
+    return mix(step_weight(sigma_t, through, dt), dt * exp(-sigma_t * (within * dt)), chosen);
 }
 
 // What is left behind this could no longer be told from black.
@@ -192,12 +204,25 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, b
     vec3 sharp_t = m.sigma_t + forward_share(m.g) * m.sigma_s;
     vec3 sharp_through = exp(-sharp_t * dt);
 #endif
-    float falloff = 1.0;
+    float falloff = 1.0, uneven = 0.0;
     if (!lamp.sun)
-        falloff = mean_inverse_square(t0 - lamp.along, t0 + dt - lamp.along, lamp.h, within);
+        falloff = mean_inverse_square(t0 - lamp.along, dt, lamp.h, within, uneven);
     vec3 p = ray.origin + ray.direction * (t0 + within * dt);
+    vec3 there = through;
+#ifdef DOM
+    vec3 sharp_there = sharp_through;
+#endif
+    // Both of one place: no step scatters more than meets it.
     if (!(scatter_known && lamp.sun))
         look_up_scatter(p, in_lattice, m);
+    if (!lamp.sun) {
+        m.sigma_t = look_up_extinct(p, in_lattice);
+        there = exp(-m.sigma_t * dt);
+#ifdef DOM
+        sharp_t = m.sigma_t + forward_share(m.g) * m.sigma_s;
+        sharp_there = exp(-sharp_t * dt);
+#endif
+    }
     vec3 towards;
     float square;
     vec3 intensity =
@@ -215,10 +240,11 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, b
 #ifdef DOM
         float soft = phase_soft(cosine, m.g);
         float peak = phase_peak(cosine, m.g, times_forward(m, depth.rgb), depth.a);
-        sum = here * (reach.soft * step_weight(m.sigma_t, through, dt) * soft +
-                      reach.sharp * step_weight(sharp_t, sharp_through, dt) * peak);
+        sum = here * (reach.soft * step_weight_at(m.sigma_t, there, dt, within, uneven) * soft +
+                      reach.sharp * step_weight_at(sharp_t, sharp_there, dt, within, uneven) * peak);
 #else
-        sum = here * (reach.soft * step_weight(m.sigma_t, through, dt) * phase_hg(cosine, m.g));
+        sum = here * reach.soft * step_weight_at(m.sigma_t, there, dt, within, uneven) *
+              phase_hg(cosine, m.g);
 #endif
     }
     reach.soft *= through;
@@ -311,7 +337,7 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             }
             first = min(first, k);
             end = k + 1;
-            // A lamp near by may see the step where it is not.
+            // A lamp near by may see the step where it is not, if in no empty brick.
             bool empty = m.sigma_t == vec3(0.0) && m.emission == vec3(0.0);
 #ifdef LAMPS
             empty = empty && lamp.sun;

@@ -48,7 +48,7 @@ vec2 shadow_texel(gpu_shadow_view view, vec2 uv, float rim)
 
 // A point of a medium has no normal to tell how surfaces lie. Near one a texel's depth is as often too near as
 // too far, and left at that: fog that is dark right before a lit wall is not seen, light right behind a dark
-// one is. What may lie on a surface stays `clear` of it, in sizes of a texel.
+// one is. What may lie on a surface stays `clear` of it, in sizes of a texel of a parallel map.
 float shadow_medium(int first, int last, vec3 p, float clear)
 {
     do {

@@ -553,6 +553,14 @@ def test_a_bare_curve_is_fog_along_its_points(scene, export, target):
     found = gaussians(export())
     assert len(found) > 12
     np.testing.assert_allclose(np.linalg.norm(found[:, :3], axis=1), 2.0, atol=0.01)
+    # What a modifier makes of it, faces or none, has the points instead.
+    def lines(tree, geometry):
+        node = tree.nodes.new('GeometryNodeCurveToMesh')
+        tree.links.new(geometry, node.inputs[0])
+        return node.outputs[0]
+    geometry_nodes(ob, lines)
+    assert len(gaussians(export())) == len(found)
+    ob.modifiers.clear()
     ob.data.bevel_depth = 0.1  # now its surface has points, more of them
     bpy.context.view_layer.update()
     assert len(gaussians(export())) > 4 * len(found)

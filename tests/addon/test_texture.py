@@ -217,6 +217,8 @@ def blender_s_noise(dimensions, rows):
     noise.noise_dimensions = f"{dimensions}D"
     noise.inputs["Scale"].default_value = 1.0
     for name in inputs:
+        if name == "W" and dimensions in (2, 3):
+            continue
         read = new('GeometryNodeInputNamedAttribute')
         read.data_type = 'FLOAT'
         read.inputs["Name"].default_value = name

@@ -297,6 +297,78 @@ static void airlight_of_lamps(void **state)
     }
 }
 
+/* Thin fog, and a dense block in it whose face is near a lamp: extinction, all of it scattering. */
+static double block_at(const double p[3])
+{
+    for (int i = 0; i < 3; ++i)
+        if (fabs(p[i]) > 1.0)
+            return 0.0;
+    const int in_block = p[0] > 0.25 && fabs(p[1]) < 0.375 && fabs(p[2]) < 0.375;
+    return 0.05 + (in_block ? 4.0 : 0.0);
+}
+
+static double block_tau(const double from[3], const double to[3], int steps)
+{
+    double sum = 0.0, square = 0.0;
+    for (int i = 0; i < 3; ++i)
+        square += (to[i] - from[i]) * (to[i] - from[i]);
+    for (int k = 0; k < steps; ++k) {
+        double p[3];
+        for (int i = 0; i < 3; ++i)
+            p[i] = from[i] + (to[i] - from[i]) * (k + 0.5) / steps;
+        sum += block_at(p);
+    }
+    return sum * sqrt(square) / steps;
+}
+
+/* What a step scatters goes with what it lets through, also where the medium begins within it. */
+static void airlight_by_a_dense_face(void **state)
+{
+    (void)state;
+    static const struct coefficients thin = {.sigma_s = {0.05f, 0.05f, 0.05f}},
+                                     dense = {.sigma_s = {4, 4, 4}};
+    static const double lamp[3] = {0.15, 0.0, 0.12}, y = 0.05;
+    enum { STEPS = 4000 };
+    double expected = 0.0;
+    for (int k = 0; k < STEPS; ++k) {
+        const double p[3] = {-1.0 + 2.0 * (k + 0.5) / STEPS, y, 0.0}, eye[3] = {-1, y, 0};
+        double square = 0.0;
+        for (int i = 0; i < 3; ++i)
+            square += (lamp[i] - p[i]) * (lamp[i] - p[i]);
+        expected += block_at(p) / (4.0 * PI) / (4.0 * PI * square) *
+                    exp(-block_tau(p, lamp, 200) - block_tau(eye, p, 400)) * 2.0 / STEPS;
+    }
+    for (float step = 1.0f; step < 5.0f; step += 2.0f) {
+        brume_settings wanted = settings;
+        wanted.step = step;
+        brume_scene *scene;
+        assert_ok(brume_scene_create(device, &scene));
+        add_fog_cube(scene, 1, origin, 1.0f, &thin);
+        add_fog_cube(scene, 2, (float[3]){0.625f, 0, 0}, 0.375f, &dense);
+        const brume_light light =
+            point_lamp((float[3]){(float)lamp[0], (float)lamp[1], (float)lamp[2]}, 1.0f);
+        assert_ok(brume_scene_set_light(scene, 1, &light));
+        brume_view view = orthographic_view((float[3]){0, (float)y, 0}, (float[3]){1, 0, 0}, 1e-4f,
+                                            3.0f, 8);
+        view.samples = 64;
+        view.passes = 1u << BRUME_PASS_VOLUME_DIRECT;
+        brume_job *job = render(scene, &wanted, &view);
+        float *pixels = read_pass(job, &view, BRUME_PASS_VOLUME_DIRECT);
+        double mean = 0.0, most = 0.0;
+        for (int pixel = 0; pixel < 64; ++pixel) {
+            mean += pixels[3 * pixel] / 64.0;
+            most = fmax(most, pixels[3 * pixel]);
+        }
+        print_message("by a dense face, step %g: %+.1f %%, the brightest pixel %+.1f %%\n",
+                      (double)step, 100.0 * (mean / expected - 1.0),
+                      100.0 * (most / expected - 1.0));
+        assert_close(mean, expected, 0.06);
+        free(pixels);
+        brume_job_release(job);
+        brume_scene_destroy(scene);
+    }
+}
+
 /* The factors by kind of receiver, as Blender's light settings have them. */
 static void volume_factor(void **state)
 {
@@ -361,7 +433,7 @@ int main(void)
         cmocka_unit_test(point_on_plate),  cmocka_unit_test(spot_on_plate),
         cmocka_unit_test(area_on_plate),   cmocka_unit_test(world_on_plate),
         cmocka_unit_test(shut_in),         cmocka_unit_test(airlight_of_lamps),
-        cmocka_unit_test(volume_factor),
+        cmocka_unit_test(airlight_by_a_dense_face), cmocka_unit_test(volume_factor),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

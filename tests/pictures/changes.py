@@ -104,10 +104,10 @@ def textured(scene):
             else:
                 link(value, socket)
         return node.outputs[0]
-    drifts = math('MULTIPLY', math('MAXIMUM', math('SUBTRACT', noise.outputs['Fac'], 0.45), 0.0),
+    drifts = math('MULTIPLY', math('MAXIMUM', math('SUBTRACT', noise.outputs[0], 0.45), 0.0),
                   40.0)
     thinner = math('SUBTRACT', 1.6, math('MULTIPLY', height.outputs['Z'], 0.7))
-    density = math('MULTIPLY', math('MULTIPLY', drifts, slope.outputs['Fac']), thinner)
+    density = math('MULTIPLY', math('MULTIPLY', drifts, slope.outputs[1]), thinner)
     link(density, tree.nodes['Volume Scatter'].inputs['Density'])
 
 
@@ -121,7 +121,7 @@ def graded(scene):
     steeper.operation = 'MULTIPLY'
     steeper.inputs[1].default_value = 2.0 * principled.inputs['Density'].default_value
     link(coordinates.outputs['Generated'], slope.inputs['Vector'])
-    link(slope.outputs['Fac'], steeper.inputs[0])
+    link(slope.outputs[1], steeper.inputs[0])
     link(steeper.outputs[0], principled.inputs['Density'])
 
 

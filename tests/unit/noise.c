@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Noise has Blender's values: tests/data/noise.txt is what its Noise Texture gives, written and
- * checked by tests/addon/test_texture.py. */
+/* Noise has Blender's values: tests/data/noise.txt is what its Noise Texture gives, as
+ * tests/addon/test_texture.py checks. */
 #include "scene/noise.h"
 
 #include <math.h>

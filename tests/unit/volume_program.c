@@ -402,6 +402,12 @@ static void ill_formed_programs_are_refused_by_name(void **state)
         {{.op = BRUME_OP_GRID, .dst = 1, .a = 2}, "instruction 1 (GRID) names grid 2 of 2"},
         {{.op = BRUME_OP_RAMP, .dst = 1, .b = 0}, "instruction 1 (RAMP) names ramp 0 of 0"},
         {{.op = BRUME_OP_COMPONENT, .dst = 1, .b = 3}, "component 3"},
+        {{.op = BRUME_OP_POSITION, .dst = 1, .a = 3}, "(POSITION) names space 3 of 3"},
+        {{.op = BRUME_OP_POSITION, .dst = 1, .a = UINT32_MAX}, "names space"},
+        {{.op = BRUME_OP_NOISE, .dst = 1, .value = {0, 1, 0}}, "(NOISE) has 0 dimensions"},
+        {{.op = BRUME_OP_NOISE, .dst = 1, .value = {5, 1, 0}}, "(NOISE) has 5 dimensions"},
+        {{.op = BRUME_OP_NOISE, .dst = 1, .value = {2.5f, 1, 0}}, "(NOISE) has 2.5 dimensions"},
+        {{.op = BRUME_OP_NOISE, .dst = 1, .value = {NAN, 1, 0}}, "(NOISE) has"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
         code[1] = cases[i].instruction;

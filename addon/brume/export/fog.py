@@ -23,7 +23,7 @@ _ATTRIBUTES = {'FLOAT': ("value", 1), 'INT': ("value", 1), 'INT8': ("value", 1),
 
 
 # Of these Blender makes a mesh beside them, unless they are bare lines.
-_LINES = {'CURVE', 'SURFACE', 'FONT'}
+LINES = {'CURVE', 'SURFACE', 'FONT'}
 
 
 class _Points(NamedTuple):
@@ -34,12 +34,14 @@ class _Points(NamedTuple):
     colors: np.ndarray = None
 
 
-def numbers(ob, own, shown):
+def numbers(ob, own, shown, bare):
     """Which of an evaluated object's sources an instance gives the fog of. own: whether its data
-    is the object's, not what modifiers made beside it; shown: whether it is itself seen."""
+    is the object's, not what modifiers made beside it; shown: whether it is itself seen; bare:
+    whether there is nothing beside it."""
     def applies(source):
         if source.source == 'POINTS':
-            return shown and ob.type in {'MESH', 'POINTCLOUD', 'EMPTY'} | _LINES
+            return shown and (ob.type in {'MESH', 'POINTCLOUD', 'EMPTY'}
+                              or ob.type in LINES and bare)
         return own and (shown or source.source == 'PARTICLES')
     return [number for number, source in enumerate(ob.brume.fog_sources)
             if source.enabled and applies(source)]
@@ -94,18 +96,16 @@ class _Reader:
             return None
         if self.ob.type == 'POINTCLOUD':
             return self.points_of(self.ob.data, self.ob.data.points)
-        if self.ob.type in _LINES:
+        if self.ob.type in LINES:
             return self.line()
         with mesh.evaluated(self.ob) as data:
             return self.points_of(data, data.vertices)
 
     def line(self):
-        """The points of a line without a surface; the vertices of a surface come as a mesh's."""
+        """The points along a line without a mesh beside it."""
         try:
             data = self.ob.to_mesh()
-            if data is None or len(data.polygons):
-                return None
-            return self.points_of(data, data.vertices)
+            return data and self.points_of(data, data.vertices)
         finally:
             self.ob.to_mesh_clear()
 

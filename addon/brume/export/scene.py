@@ -10,6 +10,7 @@ import re
 from contextlib import contextmanager
 from typing import NamedTuple
 
+import bpy
 import numpy as np
 
 from .. import native, properties
@@ -82,11 +83,16 @@ class _Export:
         self.drawn = set()   # those on a mesh
         self.shared = {}     # by mesh: its evaluated one
         self.numbers = {}    # how many shapes came up of one object and mesh
+        self.meshed = set()  # curves and such that have a mesh beside them
         self.families = None  # of metaballs that are fog, once they are asked for
 
     def run(self):
         instances = self.depsgraph.object_instances
         matrices = _matrices(instances)
+        if bpy.data.curves:
+            self.meshed = {instance.object.original for instance in instances
+                           if instance.object.type == 'MESH'
+                           and instance.object.original.type in fog.LINES}
         for index, instance in enumerate(instances):
             shown = instance.show_self
             if not shown and not instance.show_particles:
@@ -128,7 +134,8 @@ class _Export:
         if shown:
             with self.reporting(ob):
                 thing = self.itself(instance, ob)
-        numbers = fog.numbers(ob, self.is_own(ob), shown)
+        numbers = fog.numbers(ob, self.is_own(ob), shown,
+                              ob.original not in self.meshed)
         if numbers:
             def each(instance, ob, matrix):
                 self.fog(instance, ob, matrix, numbers)

@@ -120,8 +120,9 @@ def _musgrave(builder, source):
     detail, dimension, lacunarity = builder.inputs(source, "Detail", "Dimension", "Lacunarity")
     lacunarity = op("MAXIMUM", lacunarity, 1e-5)
     roughness = op("POWER", lacunarity, op("MULTIPLY", op("MAXIMUM", dimension, 1e-5), -1.0))
-    noise = _gradient_noise(builder, source, int(node.musgrave_dimensions[0]),
-                            op("SUBTRACT", detail, 1.0), roughness, lacunarity, 0.0, False)
+    octaves = op("SUBTRACT", op("MINIMUM", detail, 15.0), 1.0)
+    noise = _gradient_noise(builder, source, int(node.musgrave_dimensions[0]), octaves, roughness,
+                            lacunarity, 0.0, False)
     return op("MULTIPLY", noise, op("CLAMP01", detail))
 
 

@@ -27,6 +27,8 @@ def unable(blender, python):
     if blender < (5, 0) and python >= (3, 13):
         reasons["fluid"] = ("a Fluid domain ends Blender: its Mantaflow calls "
                             "PyImport_AppendInittab() in a running Python, which 3.13 forbids")
+    if blender >= (4, 1):
+        reasons["musgrave"] = "Blender 4.1 made the Musgrave Texture a part of the Noise Texture"
     if blender >= (4, 2):
         reasons["blend_method"] = "Blender 4.2 took EEVEE's blend methods away"
     if blender >= (5, 0):

@@ -155,14 +155,26 @@ def test_a_mapping_scales_turns_and_moves(scene, render):
         np.testing.assert_allclose(found[1:-1], wanted[1:-1], atol=0.02)
 
 
-@pytest.mark.parametrize("kind, expected", (
-    ('LINEAR', lambda x: np.clip(x, 0, 1)), ('QUADRATIC', lambda x: np.maximum(x, 0) ** 2),
-    ('EASING', lambda x: np.clip(x, 0, 1) ** 2 * (3 - 2 * np.clip(x, 0, 1)))))
-def test_gradients(scene, render, kind, expected):
+def ball(x, y, z):
+    return np.maximum(1 - np.sqrt(x * x + y * y + z * z), 0)
+
+
+GRADIENTS = {
+    'LINEAR': lambda x, y, z: x, 'QUADRATIC': lambda x, y, z: np.maximum(x, 0) ** 2,
+    'EASING': lambda x, y, z: np.clip(x, 0, 1) ** 2 * (3 - 2 * np.clip(x, 0, 1)),
+    'DIAGONAL': lambda x, y, z: (x + y) / 2,
+    'RADIAL': lambda x, y, z: np.arctan2(y, x) / (2 * np.pi) + 0.5,
+    'SPHERICAL': ball, 'QUADRATIC_SPHERE': lambda x, y, z: ball(x, y, z) ** 2}
+
+
+@pytest.mark.parametrize("kind", GRADIENTS)
+def test_gradients(scene, render, kind):
     middles = np.linspace(-1, 1, 33)[1::2]
+    x, y, z = np.meshgrid(middles, np.linspace(-1, 1, 65)[1::2], middles[2:-2], indexing='ij')
+    expected = np.clip(GRADIENTS[kind](x, y, z), 0, 1).mean((1, 2))
     found = glow(scene, render, lambda n: n.node(
         "TexGradient", 1, gradient_type=kind, Vector=n.node("TexCoord", None).outputs["Object"]))
-    np.testing.assert_allclose(found[1:-1], expected(middles)[1:-1], atol=0.02)
+    np.testing.assert_allclose(found[1:-1], expected[1:-1], atol=0.02)
 
 
 def test_a_texture_follows_its_mesh_s_box(scene, export):
@@ -194,11 +206,12 @@ def test_a_texture_goes_with_its_object(scene, export, recorder):
 # Blender's own noise, by geometry nodes
 
 
-def blender_s_noise(dimensions, rows):
-    """Fac and Color of the node at rows of x, y, z, w, detail, roughness, distortion."""
+def blender_s_noise(dimensions, rows, kind="Noise", third="Roughness", fourth="Distortion"):
+    """Fac and Color of the node at rows of x, y, z, w, detail, roughness, distortion; or of another
+    node of noise, with inputs of its own in the place of the last two, without a colour."""
     mesh = bpy.data.meshes.new("Points")
     mesh.from_pydata([tuple(row) for row in rows[:, :3]], [], [])
-    inputs = "W", "Detail", "Roughness", "Distortion"
+    inputs = "W", "Detail", third, fourth
     for column, name in enumerate(inputs, 3):
         attribute = mesh.attributes.new(name, 'FLOAT', 'POINT')
         attribute.data.foreach_set("value", np.ascontiguousarray(rows[:, column], np.float32))
@@ -213,8 +226,8 @@ def blender_s_noise(dimensions, rows):
 
     def socket(sockets, *names):
         return next(s for s in sockets if s.enabled and s.name in names)
-    noise = new('ShaderNodeTexNoise')
-    noise.noise_dimensions = f"{dimensions}D"
+    noise = new(f'ShaderNodeTex{kind}')
+    setattr(noise, f"{kind.lower()}_dimensions", f"{dimensions}D")
     noise.inputs["Scale"].default_value = 1.0
     for name in inputs:
         if name == "W" and dimensions in (2, 3):
@@ -224,9 +237,9 @@ def blender_s_noise(dimensions, rows):
         read.inputs["Name"].default_value = name
         link(socket(read.outputs, "Attribute"), noise.inputs[name])
     geometry = new('NodeGroupInput').outputs[0]
-    for name, kind, output in (("fac", 'FLOAT', 0), ("color", 'FLOAT_VECTOR', 1)):
+    for name, type_, output in (("fac", 'FLOAT', 0), ("color", 'FLOAT_VECTOR', -1)):
         store = new('GeometryNodeStoreNamedAttribute')
-        store.data_type, store.domain = kind, 'POINT'
+        store.data_type, store.domain = type_, 'POINT'
         store.inputs["Name"].default_value = name
         link(geometry, store.inputs["Geometry"])
         link(noise.outputs[output], socket(store.inputs, "Value"))
@@ -248,3 +261,33 @@ def test_the_noise_that_the_library_is_held_against_is_blender_s(scene, dimensio
     rows = table[table[:, 0] == dimensions]
     assert len(rows) >= 20
     np.testing.assert_allclose(blender_s_noise(dimensions, rows[:, 1:8]), rows[:, 8:], atol=2e-5)
+
+
+def along_x(n, scale):
+    """Coordinates that grow along x alone."""
+    return n.node("Mapping", Scale=(scale, 0, 0), Vector=n.node("TexCoord", None).outputs["Object"])
+
+
+def test_a_picture_of_noise(scene, render):
+    middles = np.linspace(-1, 1, 33)[1::2]
+    rows = np.zeros((16, 7), np.float32)
+    rows[:, 0], rows[:, 4], rows[:, 5] = 0.6 * middles, 1.5, 0.4
+    found = glow(scene, render, lambda n: n.node(
+        "TexNoise", Vector=along_x(n, 0.3), Scale=2.0, Detail=1.5, Roughness=0.4))
+    np.testing.assert_allclose(found[1:-1], blender_s_noise(3, rows)[1:-1, 0], atol=0.02)
+
+
+@pytest.mark.musgrave
+@pytest.mark.parametrize("detail", (0.4, 2.3))
+def test_a_picture_of_musgrave_s_noise(scene, render, detail):
+    middles = np.linspace(-1, 1, 33)[1::2]
+    rows = np.zeros((16, 7), np.float32)
+    rows[:, 0], rows[:, 4], rows[:, 5], rows[:, 6] = 0.6 * middles, detail, 1.2, 1.8
+    wanted = blender_s_noise(3, rows, "Musgrave", "Dimension", "Lacunarity")[:, 0]
+
+    def build(n):
+        noise = n.node("TexMusgrave", Vector=along_x(n, 0.3), Scale=2.0, Detail=detail,
+                       Dimension=1.2, Lacunarity=1.8)
+        return n.node("Math", operation='ADD', Value=noise, Value_001=2.0)
+    found = glow(scene, render, build) - 2.0
+    np.testing.assert_allclose(found[1:-1], wanted[1:-1], atol=0.02)

@@ -157,6 +157,17 @@ static void add_row(struct build *build, const struct share *share, int32_t i, i
         __atomic_store_n(&build->emits, true, __ATOMIC_RELAXED);
 }
 
+/* The cells of a row from the first to the last with any weight: to - from of them. */
+static void weighted_cells(const float *weights, int32_t width, int32_t *from, int32_t *to)
+{
+    *from = 0;
+    *to = width;
+    while (*from < *to && weights[*from] <= 0.0f)
+        ++*from;
+    while (*from < *to && weights[*to - 1] <= 0.0f)
+        --*to;
+}
+
 /* samples: room for a row, or NULL where the program is the same everywhere. */
 static void add_mesh_plane(struct build *build, const struct share *share,
                            struct medium_sample *samples, int32_t k)
@@ -165,11 +176,8 @@ static void add_mesh_plane(struct build *build, const struct share *share,
     for (int32_t j = 0; j < dims[1] && !stopped(build); ++j) {
         const float *coverage =
             share->coverage + ((size_t)k * (size_t)dims[1] + (size_t)j) * (size_t)dims[0];
-        int32_t from = 0, to = dims[0];
-        while (from < to && coverage[from] <= 0.0f)
-            ++from;
-        while (from < to && coverage[to - 1] <= 0.0f)
-            --to;
+        int32_t from, to;
+        weighted_cells(coverage, dims[0], &from, &to);
         if (samples && from < to) {
             const struct cell_row row = row_from(build, share, from, j, k);
             volume_program_run(&share->volume->program, NULL, &row, (uint32_t)(to - from), samples);
@@ -386,11 +394,8 @@ static void add_gaussian_plane(struct build *build, const struct share *share,
     for (int32_t j = 0; j < share->dims[1] && !stopped(build); ++j) {
         splat_means(worker->sums + 4 * row * (size_t)j, width, worker->means,
                     worker->means + 3 * row, worker->inside);
-        int32_t from = 0, to = width;
-        while (from < to && worker->inside[from] <= 0.0f)
-            ++from;
-        while (from < to && worker->inside[to - 1] <= 0.0f)
-            --to;
+        int32_t from, to;
+        weighted_cells(worker->inside, width, &from, &to);
         if (from == to)
             continue;
         const float *rows[2] = {worker->means + 3 * from, worker->means + 3 * (width + from)};

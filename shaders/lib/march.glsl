@@ -102,25 +102,22 @@ bool look_up(view_ray ray, float t, float dt, float within, bool in_lattice, boo
 {
     m = medium_step(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
     skipped = 0;
-    bool fog = fog_exists();
+    vec3 p = ray.origin + ray.direction * t;
+    bool fog = fog_exists(), here = in_lattice;
     if (in_lattice) {
-        vec3 p = ray.origin + ray.direction * t;
         float skip = medium_skip(p, ray.direction);
-        if (skip > 0.0) {
-            if (!fog) {
-                skipped = medium_steps_to_skip(skip, dt, within);
-                return false;
-            }
-        } else {
-            vec3 uvw = medium_coordinate(p);
-            m.sigma_t = textureLod(medium_extinct, uvw, 0.0).rgb;
-            if (emission && frame.medium_upper.w != 0.0)
-                m.emission = textureLod(medium_emission, uvw, 0.0).rgb;
+        if (skip > 0.0 && !fog) {
+            skipped = medium_steps_to_skip(skip, dt, within);
+            return false;
         }
+        here = skip <= 0.0;
     }
-    if (fog) {
-        m.sigma_t += frame.fog_sigma_t.rgb;
-        m.emission += frame.fog_emission.rgb;
+    m.sigma_t = look_up_extinct(p, here);
+    if (emission) {
+        if (here && frame.medium_upper.w != 0.0)
+            m.emission = textureLod(medium_emission, medium_coordinate(p), 0.0).rgb;
+        if (fog)
+            m.emission += frame.fog_emission.rgb;
     }
     return true;
 }
@@ -225,8 +222,7 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, b
     }
     vec3 towards;
     float square;
-    vec3 intensity =
-        falloff * light_intensity(lamp.light, lamp.point, p, towards, square);
+    vec3 intensity = falloff * light_intensity(lamp.light, lamp.point, p, towards, square);
     float distance = lamp.sun ? 1e30 : sqrt(square);
     if (m.sigma_s == vec3(0.0))
         intensity = vec3(0.0);

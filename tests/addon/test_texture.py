@@ -8,6 +8,7 @@ import pytest
 from brume.export import volume_shader
 from brume.native import OPS, SPACES
 from conftest import ROOT, Nodes, add, cube, lit, material
+from test_scene import geometry_nodes
 
 NOISE = ROOT / "tests" / "data" / "noise.txt"
 
@@ -216,41 +217,37 @@ def blender_s_noise(dimensions, rows, kind="Noise", third="Roughness", fourth="D
         attribute = mesh.attributes.new(name, 'FLOAT', 'POINT')
         attribute.data.foreach_set("value", np.ascontiguousarray(rows[:, column], np.float32))
     ob = add("Points", mesh)
-    tree = bpy.data.node_groups.new("Noise", 'GeometryNodeTree')
-    for side in ('INPUT', 'OUTPUT'):
-        if hasattr(tree, "interface"):
-            tree.interface.new_socket("Geometry", in_out=side, socket_type='NodeSocketGeometry')
-        else:  # before Blender 4.0
-            getattr(tree, f"{side.lower()}s").new('NodeSocketGeometry', "Geometry")
-    new, link = tree.nodes.new, tree.links.new
 
-    def socket(sockets, *names):
-        return next(s for s in sockets if s.enabled and s.name in names)
-    noise = new(f'ShaderNodeTex{kind}')
-    setattr(noise, f"{kind.lower()}_dimensions", f"{dimensions}D")
-    noise.inputs["Scale"].default_value = 1.0
-    for name in inputs:
-        if name == "W" and dimensions in (2, 3):
-            continue
-        read = new('GeometryNodeInputNamedAttribute')
-        read.data_type = 'FLOAT'
-        read.inputs["Name"].default_value = name
-        link(socket(read.outputs, "Attribute"), noise.inputs[name])
-    geometry = new('NodeGroupInput').outputs[0]
-    for name, type_, output in (("fac", 'FLOAT', 0), ("color", 'FLOAT_VECTOR', -1)):
-        store = new('GeometryNodeStoreNamedAttribute')
-        store.data_type, store.domain = type_, 'POINT'
-        store.inputs["Name"].default_value = name
-        link(geometry, store.inputs["Geometry"])
-        link(noise.outputs[output], socket(store.inputs, "Value"))
-        geometry = store.outputs[0]
-    link(geometry, new('NodeGroupOutput').inputs[0])
-    ob.modifiers.new("Noise", 'NODES').node_group = tree
+    def socket(sockets, name):
+        return next(s for s in sockets if s.enabled and s.name == name)
+
+    def build(tree, geometry):
+        new, link = tree.nodes.new, tree.links.new
+        noise = new(f'ShaderNodeTex{kind}')
+        setattr(noise, f"{kind.lower()}_dimensions", f"{dimensions}D")
+        noise.inputs["Scale"].default_value = 1.0
+        for name in inputs:
+            if name == "W" and dimensions in (2, 3):
+                continue
+            read = new('GeometryNodeInputNamedAttribute')
+            read.data_type = 'FLOAT'
+            read.inputs["Name"].default_value = name
+            link(socket(read.outputs, "Attribute"), noise.inputs[name])
+        for name, data_type, output in (("fac", 'FLOAT', 0), ("color", 'FLOAT_VECTOR', -1)):
+            store = new('GeometryNodeStoreNamedAttribute')
+            store.data_type, store.domain = data_type, 'POINT'
+            store.inputs["Name"].default_value = name
+            link(geometry, store.inputs["Geometry"])
+            link(noise.outputs[output], socket(store.inputs, "Value"))
+            geometry = store.outputs[0]
+        return geometry
+    geometry_nodes(ob, build)
     data = ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     found = np.empty((len(rows), 4), np.float32)
-    for columns, name, kind in ((slice(0, 1), "fac", "value"), (slice(1, 4), "color", "vector")):
+    for columns, name, field in ((slice(0, 1), "fac", "value"),
+                                 (slice(1, 4), "color", "vector")):
         values = np.empty(found[:, columns].size, np.float32)
-        data.attributes[name].data.foreach_get(kind, values)
+        data.attributes[name].data.foreach_get(field, values)
         found[:, columns] = values.reshape(len(rows), -1)
     return found
 

@@ -220,7 +220,29 @@ static double quadrature(const struct airlight *a, int channel)
     return sum;
 }
 
-/* Radiance of the pixels that look along its ray; settings->step is the march's. */
+/* What pixels that all look along +X through (0, y, z) see of the lamps' light in media: their mean
+ * and the brightest, by channels. */
+static void look_along(brume_scene *scene, const brume_settings *wanted, float y, float z,
+                       double mean[3], double most[3])
+{
+    brume_view view =
+        orthographic_view((float[3]){0, y, z}, (float[3]){1, 0, 0}, 1e-4f, 3.0f, 8);
+    view.samples = 64;
+    view.passes = 1u << BRUME_PASS_VOLUME_DIRECT;
+    brume_job *job = render(scene, wanted, &view);
+    float *pixels = read_pass(job, &view, BRUME_PASS_VOLUME_DIRECT);
+    for (int channel = 0; channel < 3; ++channel) {
+        mean[channel] = most[channel] = 0.0;
+        for (int pixel = 0; pixel < 64; ++pixel) {
+            mean[channel] += pixels[3 * pixel + channel] / 64.0;
+            most[channel] = fmax(most[channel], pixels[3 * pixel + channel]);
+        }
+    }
+    free(pixels);
+    brume_job_release(job);
+}
+
+/* step: the march's. */
 static void expect_airlight(const struct airlight *a, float step)
 {
     brume_settings wanted = settings;
@@ -239,30 +261,19 @@ static void expect_airlight(const struct airlight *a, float step)
         lamp.size[0] = lamp.size[1] = a->side;
     }
     assert_ok(brume_scene_set_light(scene, 1, &lamp));
-    brume_view view =
-        orthographic_view((float[3]){0, a->y, a->z}, (float[3]){1, 0, 0}, 1e-4f, 3.0f, 8);
-    view.samples = 64;
-    view.passes = 1u << BRUME_PASS_VOLUME_DIRECT;
-    brume_job *job = render(scene, &wanted, &view);
-    float *pixels = read_pass(job, &view, BRUME_PASS_VOLUME_DIRECT);
+    double mean[3], most[3];
+    look_along(scene, &wanted, a->y, a->z, mean, most);
+    brume_scene_destroy(scene);
     for (int channel = 0; channel < 3; ++channel) {
         const double expected = quadrature(a, channel);
-        double mean = 0.0, most = 0.0;
-        for (int pixel = 0; pixel < 64; ++pixel) {
-            mean += pixels[3 * pixel + channel] / 64.0;
-            most = fmax(most, pixels[3 * pixel + channel]);
-        }
-        if (fabs(mean - expected) > 0.02 * expected)
+        if (fabs(mean[channel] - expected) > 0.02 * expected)
             fail_msg("lamp %s, step %g: %.6g instead of %.6g, %.2f %% off", a->what, (double)step,
-                     mean, expected, 100.0 * (mean / expected - 1.0));
+                     mean[channel], expected, 100.0 * (mean[channel] / expected - 1.0));
         /* All pixels see the same; none may be a firefly. */
-        if (most > 1.25 * expected)
+        if (most[channel] > 1.25 * expected)
             fail_msg("lamp %s, step %g: a pixel of %.6g where %.6g is due", a->what, (double)step,
-                     most, expected);
+                     most[channel], expected);
     }
-    free(pixels);
-    brume_job_release(job);
-    brume_scene_destroy(scene);
 }
 
 static void airlight_of_lamps(void **state)
@@ -348,24 +359,13 @@ static void airlight_by_a_dense_face(void **state)
         const brume_light light =
             point_lamp((float[3]){(float)lamp[0], (float)lamp[1], (float)lamp[2]}, 1.0f);
         assert_ok(brume_scene_set_light(scene, 1, &light));
-        brume_view view = orthographic_view((float[3]){0, (float)y, 0}, (float[3]){1, 0, 0}, 1e-4f,
-                                            3.0f, 8);
-        view.samples = 64;
-        view.passes = 1u << BRUME_PASS_VOLUME_DIRECT;
-        brume_job *job = render(scene, &wanted, &view);
-        float *pixels = read_pass(job, &view, BRUME_PASS_VOLUME_DIRECT);
-        double mean = 0.0, most = 0.0;
-        for (int pixel = 0; pixel < 64; ++pixel) {
-            mean += pixels[3 * pixel] / 64.0;
-            most = fmax(most, pixels[3 * pixel]);
-        }
-        print_message("by a dense face, step %g: %+.1f %%, the brightest pixel %+.1f %%\n",
-                      (double)step, 100.0 * (mean / expected - 1.0),
-                      100.0 * (most / expected - 1.0));
-        assert_close(mean, expected, 0.06);
-        free(pixels);
-        brume_job_release(job);
+        double mean[3], most[3];
+        look_along(scene, &wanted, (float)y, 0, mean, most);
         brume_scene_destroy(scene);
+        print_message("by a dense face, step %g: %+.1f %%, the brightest pixel %+.1f %%\n",
+                      (double)step, 100.0 * (mean[0] / expected - 1.0),
+                      100.0 * (most[0] / expected - 1.0));
+        assert_close(mean[0], expected, 0.06);
     }
 }
 

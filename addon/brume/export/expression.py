@@ -316,25 +316,29 @@ def _math(builder, source):
     return builder.op("CLAMP01", result) if source.node.use_clamp else result
 
 
+def dot(op, a, b):
+    """Of two vectors, in all components; op: a builder's."""
+    return op("MULTIPLY", op("AVERAGE", op("MULTIPLY", a, b)), 3.0)
+
+
+def length(op, vector):
+    return op("SQRT", dot(op, vector, vector))
+
+
 def _vector_math(builder, source):
     operation = source.node.operation
     op = builder.op
     a, b, c = _inputs(builder, source, "Vector", "Vector_001", "Vector_002")
-
-    def dot(u, v):
-        return op("MULTIPLY", op("AVERAGE", op("MULTIPLY", u, v)), 3.0)
-
     if operation == "SCALE":
         return op("MULTIPLY", a, *_inputs(builder, source, "Scale"))
     if operation == "DOT_PRODUCT":
-        return dot(a, b)
+        return dot(op, a, b)
     if operation == "LENGTH":
-        return op("SQRT", dot(a, a))
+        return length(op, a)
     if operation == "DISTANCE":
-        gap = op("SUBTRACT", a, b)
-        return op("SQRT", dot(gap, gap))
+        return length(op, op("SUBTRACT", a, b))
     if operation == "NORMALIZE":
-        return op("DIVIDE", a, op("SQRT", dot(a, a)))
+        return op("DIVIDE", a, length(op, a))
     if operation not in {"ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "MULTIPLY_ADD", "ABSOLUTE",
                          "MINIMUM", "MAXIMUM", "FLOOR", "CEIL", "FRACTION", "MODULO", "WRAP",
                          "SNAP", "SINE", "COSINE", "TANGENT"}:

@@ -83,13 +83,14 @@ class _Export:
         self.drawn = set()   # those on a mesh
         self.shared = {}     # by mesh: its evaluated one
         self.numbers = {}    # how many shapes came up of one object and mesh
-        self.meshed = set()  # curves and such that have a mesh beside them
+        self.meshed = set()  # curves that may be fog and have a mesh beside them
         self.families = None  # of metaballs that are fog, once they are asked for
 
     def run(self):
         instances = self.depsgraph.object_instances
         matrices = _matrices(instances)
-        if bpy.data.curves:
+        if bpy.data.curves and any(ob.type in fog.LINES and fog.is_fog(ob, 'POINTS')
+                                   for ob in bpy.data.objects):
             self.meshed = {instance.object.original for instance in instances
                            if instance.object.type == 'MESH'
                            and instance.object.original.type in fog.LINES}
@@ -134,8 +135,7 @@ class _Export:
         if shown:
             with self.reporting(ob):
                 thing = self.itself(instance, ob)
-        numbers = fog.numbers(ob, self.is_own(ob), shown,
-                              ob.original not in self.meshed)
+        numbers = fog.numbers(ob, self.is_own(ob), shown, ob.original not in self.meshed)
         if numbers:
             def each(instance, ob, matrix):
                 self.fog(instance, ob, matrix, numbers)

@@ -8,7 +8,7 @@ from mathutils import Euler
 
 from ..native import SPACES
 from . import nodes
-from .expression import Unsupported
+from .expression import Unsupported, length
 
 
 def _position(builder, source, space):
@@ -75,8 +75,7 @@ def _mapping(builder, source):
     turn = np.array(Euler(angles).to_matrix())
     if node.vector_type == 'NORMAL':
         turned = _times(builder, turn, op("DIVIDE", vector, scale))
-        square = op("MULTIPLY", op("AVERAGE", op("MULTIPLY", turned, turned)), 3.0)
-        return op("DIVIDE", turned, op("SQRT", square))
+        return op("DIVIDE", turned, length(op, turned))
     if node.vector_type == 'VECTOR':
         return _times(builder, turn, op("MULTIPLY", vector, scale))
     location, = builder.inputs(source, "Location")
@@ -141,8 +140,7 @@ def _gradient(builder, source):
     elif kind == 'RADIAL':
         value = op("MULTIPLY_ADD", op("ARCTANGENT2", y, x), 0.5 / math.pi, 0.5)
     else:
-        square = op("MULTIPLY", op("AVERAGE", op("MULTIPLY", vector, vector)), 3.0)
-        value = op("MAXIMUM", op("SUBTRACT", 0.999999, op("SQRT", square)), 0.0)
+        value = op("MAXIMUM", op("SUBTRACT", 0.999999, length(op, vector)), 0.0)
         if kind == 'QUADRATIC_SPHERE':
             value = op("MULTIPLY", value, value)
     return op("CLAMP01", value)

@@ -16,7 +16,10 @@ layout(std140, binding = SLOT_STAGE) uniform stage_block
     gpu_lattice_pass stage;
 };
 
-layout(binding = SLOT_OUTPUT, rgba32f) writeonly uniform image3D flow_image[3];
+layout(std430, binding = SLOT_SCATTERED_FLOWS) writeonly buffer flows_block
+{
+    vec4 flows[]; // of every cell three: red, green, blue
+};
 
 const int POINTS = 64; // along the lattice
 
@@ -75,5 +78,5 @@ void main()
         add_scattered(flow, p, part, start + uint(i));
     } while (++i < points * points * points);
     for (int c = 0; c < 3; ++c)
-        imageStore(flow_image[c], cell, flow[c]);
+        flows[3 * cell_number(cell) + c] = flow[c];
 }

@@ -30,6 +30,12 @@ static brume_result lattice_texture(struct lpv_work *work, struct texture *textu
                         1, label);
 }
 
+/* Otherwise the lattice knows surfaces alone. */
+static int with_media(const struct lpv_work *work)
+{
+    return work->input->settings->light_paths == BRUME_PATHS_ALL;
+}
+
 static brume_result make(struct lpv_work *work)
 {
     const ivec4 dims = work->field->dims;
@@ -47,6 +53,9 @@ static brume_result make(struct lpv_work *work)
                          GL_TEXTURE_2D, GL_RGBA32F, texture_side(work->tiles * dims.x),
                          texture_side(rows * dims.y), 1, 1, "reflected light"));
     }
+    if (with_media(work))
+        TRY(buffer_init(&work->input->gpu->memory, &work->scattered, FOR_TRANSPORT,
+                        cell_count(&dims) * 3 * sizeof(vec4), NULL, "scattered light"));
     TRY(buffer_init(&work->input->gpu->memory, &work->powers, FOR_TRANSPORT,
                     cell_count(&dims) * sizeof(float), NULL, "powers in flight"));
     TRY(texture_init(&work->input->gpu->memory, &work->links, FOR_TRANSPORT, GL_TEXTURE_3D,
@@ -73,6 +82,7 @@ static void finish(struct lpv_work *work)
     texture_finish(memory, &work->cells_around);
     texture_finish(memory, &work->walls);
     lpv_fuzzy_finish(work);
+    buffer_finish(memory, &work->scattered);
     buffer_finish(memory, &work->powers);
     buffer_finish(memory, &work->level);
     buffer_finish(memory, &work->passes.block);
@@ -102,12 +112,6 @@ brume_result lpv_over_lattice(struct lpv_work *work, const char *stem, ivec4 off
 static brume_result over_field(struct lpv_work *work, const char *stem, ivec4 offset)
 {
     return lpv_over_lattice(work, stem, offset, &work->field->dims);
-}
-
-/* Otherwise the lattice knows surfaces alone. */
-static int with_media(const struct lpv_work *work)
-{
-    return work->input->settings->light_paths == BRUME_PATHS_ALL;
 }
 
 static brume_result fill_cells(struct lpv_work *work)
@@ -141,26 +145,26 @@ static void bind_level(const struct lpv_work *work)
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_POWERS, work->powers.id);
 }
 
-/* What media scatter, into the textures that the first iteration fills anew; made empty, as the sums. */
+/* What media scatter. */
 static brume_result scatter(struct lpv_work *work)
 {
     if (!with_media(work))
         return BRUME_OK;
     laps_go(work->laps, BRUME_FIELD_SCATTERED);
     const bool sky = work->input->frame->sky_dims.w != 0;
-    bind_images(SLOT_OUTPUT, work->flow[1], GL_WRITE_ONLY, GL_RGBA32F);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_SCATTERED_FLOWS, work->scattered.id);
     TRY(over_field(work, sky ? "lpv_scatter:SKY" : "lpv_scatter", (ivec4){0}));
-    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     return BRUME_OK;
 }
 
 static brume_result begin(struct lpv_work *work)
 {
     laps_go(work->laps, BRUME_FIELD_AGGREGATE);
-    bind_textures(SLOT_FLOW, work->flow[1]);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, SLOT_SCATTERED_FLOWS, work->scattered.id);
     bind_textures(SLOT_REFLECTED, work->reflected);
     bind_images(SLOT_OUTPUT, work->flow[0], GL_WRITE_ONLY, GL_RGBA32F);
-    TRY(over_field(work, "lpv_aggregate", (ivec4){work->tiles, 0, 0, 0}));
+    TRY(over_field(work, "lpv_aggregate", (ivec4){work->tiles, with_media(work), 0, 0}));
     laps_go(work->laps, BRUME_FIELD_PREPARE);
     if (!work->around)
         TRY(in_flight(work, &work->input->stats->power_begun));

@@ -7,7 +7,7 @@
 
 /* Bytes of a cell: of the field, and of what is needed while it is found. */
 #define FIELD_CELL_BYTES 64
-#define FIELD_WORKING_BYTES 280 /* and one layer more of what is cut */
+#define FIELD_WORKING_BYTES 328 /* and one layer more of what is cut */
 #define FIELD_FUZZY_BYTES 96 /* the same, for fuzzy blockers, and one layer more of their lattice */
 /* Beside the lattice: reflective shadow maps, and blocks. */
 #define FIELD_FIXED_BYTES (3u << 20)
@@ -41,6 +41,8 @@ struct lpv_work {
     struct texture reflected[3];    /* what surfaces reflect first, the lattice's layers as tiles */
     int tiles;                      /* of these in a row */
     struct laps *laps;              /* the time of each part, of all lattices */
+    struct buffer scattered;        /* by media first; by cells, three vec4 each. Not a texture:
+                                     * software stores into those four times as slowly */
     struct buffer powers;           /* in flight after the last iteration, by cells */
     struct lpv_fuzzy fuzzy;         /* nothing, where links block */
 };

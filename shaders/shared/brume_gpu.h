@@ -39,6 +39,7 @@ typedef struct mat4 { float m[16]; } mat4;
 #define SLOT_DEPTH_SOURCES 4
 #define SLOT_REST 4
 #define SLOT_DEPTH_GROUPS 5
+#define SLOT_SCATTERED_FLOWS 5
 #define SLOT_POWERS 6
 #define SLOT_DOTS 7
 

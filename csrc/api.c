@@ -29,9 +29,9 @@ size_t brume_struct_size(const char *name)
         ENTRY(brume_instruction),   ENTRY(brume_volume_program), ENTRY(brume_gaussian),
         ENTRY(brume_volume),        ENTRY(brume_mesh),           ENTRY(brume_instances),
         ENTRY(brume_material),      ENTRY(brume_image),          ENTRY(brume_light),
-        ENTRY(brume_world),         ENTRY(brume_settings),       ENTRY(brume_view),
-        ENTRY(brume_stage_stats),   ENTRY(brume_stats),          ENTRY(brume_job_status),
-        ENTRY(brume_exr_channel),
+        ENTRY(brume_world),         ENTRY(brume_settings),       ENTRY(brume_lens),
+        ENTRY(brume_view),          ENTRY(brume_stage_stats),    ENTRY(brume_stats),
+        ENTRY(brume_job_status),    ENTRY(brume_exr_channel),
     };
 #undef ENTRY
     for (size_t i = 0; name && i < sizeof sizes / sizeof *sizes; ++i)

@@ -33,7 +33,7 @@ extern "C" {
 #endif
 
 /* Raised by every change to a struct, an enumerator or a function below. */
-#define BRUME_ABI 9u
+#define BRUME_ABI 10u
 
 BRUME_API uint32_t brume_abi(void);
 
@@ -526,6 +526,18 @@ typedef enum brume_pass {
 BRUME_API uint32_t brume_pass_channels(uint32_t pass);
 BRUME_API const char *brume_pass_name(uint32_t pass);
 
+/* A thin lens in the place of the eye: things are the more blurred, the farther they are from the
+ * plane in focus. Zeroed: none, all is sharp. Its picture is that of as many places in its opening
+ * as there are samples. */
+typedef struct brume_lens {
+    float radius;                    /* m, of the circle around the opening, 1e6 at most; 0: no lens */
+    float focus;                     /* m along the view axis, 1e-6 at least, of the plane that is
+                                        sharp */
+    uint32_t blades;                 /* corners of the opening; below 3: a disk */
+    float rotation;                  /* of the blades, rad, from the view's right to its up */
+    float ratio;                     /* of the opening's height to its width, 0.01 to 100; 0: 1 */
+} brume_lens;
+
 typedef struct brume_view {
     int32_t width, height;           /* pixels */
     float view_from_world[16];
@@ -545,6 +557,7 @@ typedef struct brume_view {
                                         samples: fewer are quicker and grainier; 0: 32 */
     uint32_t half_march;             /* 1: light in media at half the resolution, fitted to edges of
                                         surfaces: about four times as quick, and softer */
+    brume_lens lens;
 } brume_view;
 
 typedef enum brume_stage {

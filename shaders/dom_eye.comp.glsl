@@ -17,9 +17,7 @@ void main()
     ivec3 cell = ivec3(gl_GlobalInvocationID);
     if (!in_level(cell))
         return;
-    bool orthographic = frame.ray_direction_x.xyz == vec3(0.0);
-    vec3 out_ = orthographic ? -frame.ray_direction.xyz
-                             : frame.ray_origin.xyz - cell_centre(level, cell);
+    vec3 out_ = frame.eye.w == 0.0 ? -frame.eye.xyz : frame.eye.xyz - cell_centre(level, cell);
     out_ *= inversesqrt(max(dot(out_, out_), 1e-20));
     float y[MOMENTS];
     harmonics(out_, y);

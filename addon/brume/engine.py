@@ -98,7 +98,7 @@ class BrumeEngine(bpy.types.RenderEngine):
             clip_far=seen.clip_far, samples=4 if self.is_preview else settings.samples,
             seed=settings.seed, filter_width=scene_eval.render.filter_size,
             film_transparent=scene_eval.render.film_transparent,
-            half_march=settings.half_resolution_volumes,
+            half_march=settings.half_resolution_volumes, lens=native.Lens(*seen.lens),
             passes=sum(1 << number for number, *_ in passes),
             progressive=not (self.is_preview or bpy.app.background), urgent=self.is_preview)
         return view, passes

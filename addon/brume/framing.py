@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .export.camera import cropped
+from .export.camera import Lens, cropped, lens_of
 
 
 class Framing(NamedTuple):
@@ -17,6 +17,7 @@ class Framing(NamedTuple):
     clip_from_view: tuple   # of the part
     clip_near: float
     clip_far: float
+    lens: Lens
 
 
 def state(context):
@@ -93,4 +94,4 @@ def of(context, scene):
     projection = cropped(np.array(region_view.window_matrix, np.float64), region, part)
     return Framing(region, part, tuple(np.array(region_view.view_matrix).ravel().tolist()),
                    tuple(projection.ravel().tolist()),
-                   *clip_range(region_view.window_matrix, clip_end))
+                   *clip_range(region_view.window_matrix, clip_end), lens_of(camera))

@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-ABI = 9
+ABI = 10
 PASSES = ("COMBINED", "DEPTH", "NORMAL", "VOLUME_DIRECT", "EMISSION", "ENVIRONMENT",
           "TRANSMITTANCE", "VOLUME_INDIRECT")
 PASS_CHANNELS = (4, 1, 3, 3, 3, 3, 3, 3)
@@ -172,12 +172,18 @@ class Settings(Structure):
                 ("memory_budget", c_uint64)]
 
 
+class Lens(Structure):
+    _fields_ = [("radius", c_float), ("focus", c_float), ("blades", c_uint32),
+                ("rotation", c_float), ("ratio", c_float)]
+
+
 class View(Structure):
     _fields_ = [("width", c_int32), ("height", c_int32), ("view_from_world", Mat4),
                 ("clip_from_view", Mat4), ("clip_near", c_float), ("clip_far", c_float),
                 ("samples", c_uint32), ("seed", c_uint32), ("filter_width", c_float),
                 ("film_transparent", c_uint32), ("passes", c_uint32), ("progressive", c_uint32),
-                ("urgent", c_uint32), ("world_draws", c_uint32), ("half_march", c_uint32)]
+                ("urgent", c_uint32), ("world_draws", c_uint32), ("half_march", c_uint32),
+                ("lens", Lens)]
 
 
 class StageStats(Structure):
@@ -219,7 +225,7 @@ STRUCTS = {
     "brume_volume_program": VolumeProgram, "brume_gaussian": Gaussian, "brume_volume": Volume,
     "brume_mesh": Mesh, "brume_instances": Instances, "brume_material": Material,
     "brume_image": Image, "brume_light": Light, "brume_world": World, "brume_settings": Settings,
-    "brume_view": View, "brume_stage_stats": StageStats, "brume_stats": Stats,
+    "brume_lens": Lens, "brume_view": View, "brume_stage_stats": StageStats, "brume_stats": Stats,
     "brume_job_status": JobStatus, "brume_exr_channel": ExrChannel,
 }
 

@@ -381,6 +381,7 @@ class View:
             film_transparent=scene_eval.render.film_transparent,
             half_march=scene_eval.brume.half_resolution_volumes,
             progressive=task.samples > 1, urgent=task.look,
+            lens=native.Lens(*wish.framing.lens),
             world_draws=_ROUGH_WORLD_DRAWS if task.rough else 0)
         with self.stage.lock:
             self.job = self.stage.scene.render(settings, view)

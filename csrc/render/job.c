@@ -55,6 +55,8 @@ static brume_result check_settings(brume_settings *settings)
     return BRUME_OK;
 }
 
+#define LENS_MOST 1e6f /* m: what is far smaller than that has a matrix that can be inverted */
+
 static brume_result check_view(brume_view *view)
 {
     float inverse[16];
@@ -79,6 +81,13 @@ static brume_result check_view(brume_view *view)
         return fail(BRUME_E_TRANSFORM, "the camera's projection is singular or not finite");
     if (view->clip_from_view[15] == 0.0f)
         REQUIRE(view->clip_near > 0.0f);
+    const brume_lens *lens = &view->lens;
+    REQUIRE(lens->radius >= 0.0f && lens->radius <= LENS_MOST);
+    if (lens->radius > 0.0f) {
+        REQUIRE(lens->focus >= 1.0f / LENS_MOST && isfinite(lens->focus));
+        REQUIRE(lens->blades <= 1024 && isfinite(lens->rotation));
+        REQUIRE(lens->ratio == 0.0f || (lens->ratio >= 0.01f && lens->ratio <= 100.0f));
+    }
     return BRUME_OK;
 }
 

@@ -3,6 +3,7 @@
 #include "render/renderer.h"
 #include "base/hash.h"
 #include "base/result.h"
+#include "base/spread.h"
 #include "gl/timer.h"
 #include "math/frame.h"
 #include "render/lattice.h"
@@ -142,23 +143,6 @@ static brume_result work_medium(struct run *run)
     }
     medium_finish(&lattice);
     return result;
-}
-
-/* A step through `count` things that visits all of them, each far from the last: prime to their
- * count, and near the share of a low-discrepancy sequence that no lot of the shaders follows. */
-static uint32_t spread_step(uint32_t count)
-{
-    const uint32_t wanted = (uint32_t)(0.8191725134 * count);
-    for (uint32_t step = wanted ? wanted : 1;; ++step) {
-        uint32_t a = count, b = step;
-        while (b) {
-            const uint32_t rest = a % b;
-            a = b;
-            b = rest;
-        }
-        if (a == 1 || count == 0)
-            return step;
-    }
 }
 
 static brume_result update_world_map(struct run *run)

@@ -4,6 +4,7 @@
 #include "base/result.h"
 #include "math/frame.h"
 #include "render/filter.h"
+#include "render/lens.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -40,11 +41,42 @@ static void sample_offset(const brume_view *view, uint32_t sample, float ndc[2])
     ndc[1] *= 2.0f / (float)view->height;
 }
 
+/* World to view of a sample: from its place in the lens, and sheared so that what is in focus stays
+ * where it is. */
+static void sample_view(const brume_view *view, uint32_t sample, float view_from_world[16])
+{
+    const brume_lens *lens = &view->lens;
+    if (lens->radius <= 0.0f) {
+        memcpy(view_from_world, view->view_from_world, 16 * sizeof *view_from_world);
+        return;
+    }
+    float aside[2], shear[16];
+    lens_offset(lens, sample, view->samples, aside);
+    mat4_identity(shear);
+    for (int i = 0; i < 2; ++i) {
+        shear[8 + i] = -aside[i] / lens->focus;
+        shear[12 + i] = -aside[i];
+    }
+    mat4_multiply(shear, view->view_from_world, view_from_world);
+}
+
+/* Where the eye is, or with w 0 the way that a parallel view looks. */
+static vec4 eye_of(const brume_view *view, const float view_from_world[16])
+{
+    float world_from_view[16];
+    mat4_invert(view_from_world, world_from_view);
+    return is_orthographic(view)
+               ? rotate(world_from_view, 0.0f, 0.0f, -1.0f)
+               : (vec4){world_from_view[12], world_from_view[13], world_from_view[14], 1.0f};
+}
+
 void view_frame(const brume_view *view, uint32_t sample, struct gpu_frame *frame)
 {
     const float *p = view->clip_from_view;
-    float world_from_view[16], ndc[2];
-    mat4_invert(view->view_from_world, world_from_view); /* checked when the job was made */
+    float view_from_world[16], world_from_view[16], ndc[2];
+    sample_view(view, sample, view_from_world);
+    mat4_invert(view_from_world, world_from_view); /* checked when the job was made */
+    frame->eye = eye_of(view, view->view_from_world);
     sample_offset(view, sample, ndc);
     const float dx = 1.0f / p[0], dy = 1.0f / p[5];
     const vec4 eye = {world_from_view[12], world_from_view[13], world_from_view[14], 0.0f};
@@ -76,10 +108,10 @@ void view_frame(const brume_view *view, uint32_t sample, struct gpu_frame *frame
 
 static struct gpu_draw camera_draw(const brume_view *view, uint32_t sample)
 {
-    float world_from_view[16], projection[16], ndc[2];
+    float view_from_world[16], projection[16], ndc[2];
     const float near_ = view->clip_near, far_ = view->clip_far;
     const int orthographic = is_orthographic(view);
-    mat4_invert(view->view_from_world, world_from_view);
+    sample_view(view, sample, view_from_world);
     sample_offset(view, sample, ndc);
     memcpy(projection, view->clip_from_view, sizeof projection);
     /* Reversed depth instead of the caller's: near / distance, or even from 1 to 0. */
@@ -96,10 +128,8 @@ static struct gpu_draw camera_draw(const brume_view *view, uint32_t sample)
     }
     struct gpu_draw draw = {.clip = {near_, far_, orthographic ? 1.0f : 0.0f, 0.0f},
                             .info = {view->seed + sample, 0, 0, 0}};
-    mat4_multiply(projection, view->view_from_world, draw.clip_from_world.m);
-    draw.eye = orthographic
-                   ? rotate(world_from_view, 0.0f, 0.0f, -1.0f)
-                   : (vec4){world_from_view[12], world_from_view[13], world_from_view[14], 1.0f};
+    mat4_multiply(projection, view_from_world, draw.clip_from_world.m);
+    draw.eye = eye_of(view, view_from_world);
     return draw;
 }
 

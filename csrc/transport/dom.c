@@ -131,10 +131,7 @@ brume_result dom_run(struct transport *transport, const struct transport_input *
 /* Where the eye is, or for a parallel view which way it looks. */
 static uint64_t eye_signature(const struct gpu_frame *frame)
 {
-    const vec4 x = frame->ray_direction_x;
-    const bool parallel = x.x == 0.0f && x.y == 0.0f && x.z == 0.0f;
-    const vec4 at = parallel ? frame->ray_direction : frame->ray_origin;
-    const float eye[4] = {at.x, at.y, at.z, parallel};
+    const float eye[4] = {frame->eye.x, frame->eye.y, frame->eye.z, frame->eye.w};
     const uint64_t hash = hash_bytes(HASH_START, eye, sizeof eye);
     return hash ? hash : 1;
 }

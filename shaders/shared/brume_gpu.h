@@ -320,6 +320,7 @@ struct gpu_ordinates {
 struct gpu_frame {
     vec4 ray_origin, ray_origin_x, ray_origin_y; /* ray = origin + x ndc.x + y ndc.y */
     vec4 ray_direction, ray_direction_x, ray_direction_y; /* view depth 1 per unit */
+    vec4 eye;            /* of all samples; w: 0: the way it looks, of a parallel view */
     ivec4 size;          /* width, height, number of this sample, seed */
     vec4 clip;           /* near, far, film transparent, samples in all */
     vec4 medium_lower;   /* w: cell, m */

@@ -251,6 +251,42 @@ def test_border_is_a_window_of_the_picture(scene, target):
         close(pixel - pixel_in_part, part[:2])
 
 
+def lens(scene, target, data=None, **values):
+    seen = matrices(scene, target, **(data or {}))
+    assert seen.lens == camera.Lens()
+    dof = scene.camera.data.dof
+    dof.use_dof = True
+    for name, value in values.items():
+        setattr(dof, name, value)
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return camera.final(Engine(), depsgraph, target, (4, 4), (0, 0, 4, 4)).lens
+
+
+def test_lens(scene, target):
+    found = lens(scene, target, {"lens": 50.0}, aperture_fstop=2.5, focus_distance=3.0,
+                 aperture_blades=5, aperture_rotation=0.25, aperture_ratio=1.5)
+    close(found, (0.01, 3.0, 5, 0.25, 1.5))  # half of 50 mm / 2.5
+    # As Cycles, which takes a parallel view for one of 1 m.
+    found = lens(scene, target, {"type": 'ORTHO'}, aperture_fstop=2.5, focus_distance=0.0)
+    close(found[0], 0.2)
+    assert found.focus > 0
+    assert not list(target.reports)
+
+
+def test_focus_on_an_object_and_on_a_bone(scene, target):
+    # The camera stands at (1, 2, 3) and looks along -z: what is aside of its axis does not count.
+    post = add("Post", bpy.data.armatures.new("Post"), location=(7, 8, -2))
+    close(lens(scene, target, focus_object=post).focus, 5.0)
+    bpy.context.view_layer.objects.active = post
+    bpy.ops.object.mode_set(mode='EDIT')
+    bone = post.data.edit_bones.new("Tip")
+    bone.head, bone.tail = (0, 0, 1.5), (0, 1, 1.5)
+    bpy.ops.object.mode_set(mode='OBJECT')
+    close(lens(scene, target, focus_object=post, focus_subtarget="Tip").focus, 3.5)
+    close(lens(scene, target, focus_object=post, focus_subtarget="none").focus, 5.0)
+
+
 def test_no_camera(scene, target):
     scene.camera = None
     with pytest.raises(BrumeError) as caught:

@@ -93,6 +93,8 @@ CASES = {case.name: case for case in (
     Case('surfaces', (), 0.05, 256, change='film_transparent'),
     Case('surfaces', (), 0.03, 256, change='percentage'),
     Case('cube', (), 0.04, 512, change='inside'),
+    Case('cube', (), 0.04, 512, change='focused'),
+    Case('surfaces', (), 0.03, 512, size=256, groups=GROUPS, change='focused'),
     Case('cube', (), 0.04, 512, change='fog_on_film'),
     Case('cube', (), 0.04, 512, zoom=1.4, step_rate=0.1, change='textured'),
     Case('cloud', (), 0.04, 512, zoom=1.15, change='graded'),

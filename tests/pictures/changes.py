@@ -56,6 +56,16 @@ def inside(scene):
     scene.camera.data.lens = 24.0
 
 
+def focused(scene):
+    """A wide lens of five blades."""
+    camera = scene.camera.data
+    camera.dof.use_dof = True
+    camera.dof.focus_distance = 7.0
+    camera.dof.aperture_fstop = 0.2
+    camera.dof.aperture_blades, camera.dof.aperture_rotation = 5, 0.3
+    camera.dof.aperture_ratio = 1.5
+
+
 def fog_on_film(scene):
     scene.render.film_transparent = True
     scene.objects['Floor'].hide_render = True

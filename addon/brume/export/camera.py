@@ -8,11 +8,44 @@ import numpy as np
 from ..native import BrumeError
 
 
+class Lens(NamedTuple):
+    """A thin lens; compares by value. Without one all is sharp."""
+    radius: float = 0.0    # m, of the circle around its opening
+    focus: float = 1.0     # m along the view axis, of what is sharp
+    blades: int = 0
+    rotation: float = 0.0
+    ratio: float = 1.0
+
+
 class Camera(NamedTuple):
     view_from_world: np.ndarray
     clip_from_view: np.ndarray
     clip_near: float
     clip_far: float
+    lens: Lens
+
+
+def _focus(ob):
+    """How far along its axis a camera is focused: on an object, on a bone of one, or as it says."""
+    dof = ob.data.dof
+    if dof.focus_object is None:
+        return dof.focus_distance
+    place = dof.focus_object.matrix_world
+    bone = dof.focus_object.pose and dof.focus_object.pose.bones.get(dof.focus_subtarget)
+    if bone:
+        place = place @ bone.matrix
+    axis = ob.matrix_world.to_3x3().col[2].normalized()
+    return abs(axis.dot(place.translation - ob.matrix_world.translation))
+
+
+def lens_of(ob):
+    """The lens of an object, as Cycles has it: of a parallel view as if it were one of 1 m."""
+    if ob is None or ob.type != 'CAMERA' or not ob.data.dof.use_dof:
+        return Lens()
+    data, dof = ob.data, ob.data.dof
+    length = 1.0 if data.type == 'ORTHO' else data.lens * 1e-3
+    return Lens(0.5 * length / max(dof.aperture_fstop, 1e-5), max(_focus(ob), 1e-5),
+                dof.aperture_blades, dof.aperture_rotation, dof.aperture_ratio)
 
 
 def border_pixels(render, width, height):
@@ -49,8 +82,6 @@ def final(engine, depsgraph, target, full, part):
     if ob.type == 'CAMERA':
         if ob.data.type not in {'PERSP', 'ORTHO'}:
             target.reports.unsupported(owner, f"type {ob.data.type} is shown as perspective.")
-        if ob.data.dof.use_dof:
-            target.reports.unsupported(owner, "depth of field is not shown.")
     if scene.render.use_motion_blur:
         target.reports.unsupported(f'Scene "{scene.name}"', "motion blur is not shown.")
     render = scene.render
@@ -59,4 +90,5 @@ def final(engine, depsgraph, target, full, part):
                                        scale_y=render.pixel_aspect_y)
     pose = engine.camera_model_matrix(ob).normalized()
     near, far = (ob.data.clip_start, ob.data.clip_end) if ob.type == 'CAMERA' else (0.1, 100.0)
-    return Camera(np.array(pose.inverted()), cropped(np.array(projection), full, part), near, far)
+    return Camera(np.array(pose.inverted()), cropped(np.array(projection), full, part), near, far,
+                  lens_of(ob))

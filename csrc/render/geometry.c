@@ -256,7 +256,7 @@ static void write_instance(struct gpu_instance *out, const float *world_from_obj
 
 static void add_draws(struct geometry *geometry, const struct snapshot *snapshot,
                       const struct mesh_block *mesh, const struct gpu_mesh *gpu_mesh,
-                      const struct instances_block *set, const float lower[3],
+                      const struct entry *set, const float lower[3],
                       const float upper[3], uint32_t first_instance, uint32_t instance_count)
 {
     const struct table *materials = &snapshot->tables[BRUME_KIND_MATERIAL];
@@ -271,7 +271,9 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
                               .corner_count = 3 * (end - first),
                               .first_instance = first_instance,
                               .instance_count = instance_count,
-                              .visibility = set->visibility,
+                              .visibility = ((struct instances_block *)set->block)->visibility,
+                              .mesh = gpu_mesh->key,
+                              .set = set->key,
                               .opaque = 1};
         memcpy(draw->lower, lower, sizeof draw->lower);
         memcpy(draw->upper, upper, sizeof draw->upper);
@@ -359,7 +361,8 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
                      set->count - (next - first), set->count, mesh->name);
         if (next == first)
             continue;
-        add_draws(geometry, snapshot, mesh, gpu_mesh, set, lower, upper, first, next - first);
+        add_draws(geometry, snapshot, mesh, gpu_mesh, &table->entries[i], lower, upper, first,
+                  next - first);
         geometry->triangle_count += mesh->triangle_count * (next - first);
     }
     if (result == BRUME_OK)
@@ -493,6 +496,7 @@ brume_result geometry_draw(struct gpu *gpu, struct geometry *geometry, const str
     for (uint32_t i = 0; i < geometry->draw_count; ++i) {
         const struct draw *draw = &geometry->draws[i];
         if ((draw->visibility & visibility) != visibility ||
+            (draw->as_lamps && (visibility & BRUME_VISIBLE_SHADOW)) ||
             (pass == GEOMETRY_TINT && !draw->tinted) ||
             is_outside(draw, &stage->clip_from_world))
             continue;

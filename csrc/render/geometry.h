@@ -28,6 +28,8 @@ struct draw {
     uint32_t first_instance, instance_count;
     uint32_t material;
     uint32_t visibility;
+    uint64_t mesh, set; /* keys */
+    int as_lamps; /* lamps stand for it: seen, it lights nothing and casts no shadow */
     int tinted; /* colours what is seen through it */
     int opaque; /* all of it covers what is behind */
 };

@@ -209,7 +209,7 @@ static brume_result work_shadow(struct run *run)
     const struct render_request *request = run->request;
     job_report(request->control, BRUME_STAGE_SHADOW, 0.02f);
     TRY(shadows_layout(&renderer->shadows, request->snapshot, &renderer->world_map,
-                       &request->settings, &renderer->geometry, &renderer->shadow_plan,
+                       &renderer->emitters, &request->settings, &renderer->geometry, &renderer->shadow_plan,
                        request->control));
     TRY(shadows_upload(run->gpu, &renderer->shadows));
     return shadows_render(run->gpu, &renderer->shadows, &renderer->geometry,
@@ -530,16 +530,19 @@ static brume_result run_stages(struct run *run)
                                settings->method == BRUME_METHOD_DOM};
     TRY(run_if_changed(run, BRUME_STAGE_MEDIUM, medium, 4, work_medium));
     TRY(update_world_map(run));
-    TRY(shadows_plan(snapshot, &renderer->world_map, settings, &renderer->geometry,
-                     shares->shadow, &renderer->shadow_plan));
+    lattice_place(renderer, request);
+    emitters_update(&renderer->emitters, &renderer->geometry, snapshot, &renderer->frame,
+                    stages[BRUME_STAGE_UPLOAD].revision, settings->method == BRUME_METHOD_DOM);
+    TRY(shadows_plan(snapshot, &renderer->world_map, &renderer->emitters, settings,
+                     &renderer->geometry, shares->shadow, &renderer->shadow_plan));
     const uint64_t shadow[] = {stages[BRUME_STAGE_UPLOAD].revision,
                                snapshot->tables[BRUME_KIND_LIGHT].revision,
                                snapshot->world_revision,
                                (uint64_t)renderer->shadow_plan.side,
                                renderer->shadow_plan.light_samples,
-                               renderer->shadow_plan.world_samples};
-    TRY(run_if_changed(run, BRUME_STAGE_SHADOW, shadow, 6, work_shadow));
-    lattice_place(renderer, request);
+                               renderer->shadow_plan.world_samples,
+                               renderer->emitters.signature};
+    TRY(run_if_changed(run, BRUME_STAGE_SHADOW, shadow, 7, work_shadow));
     const uint64_t transport[] = {stages[BRUME_STAGE_MEDIUM].revision,
                                   stages[BRUME_STAGE_SHADOW].revision,
                                   (uint64_t)settings->lattice_resolution,

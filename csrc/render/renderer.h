@@ -36,6 +36,7 @@ struct renderer {
     int field_resolution; /* cells of the frame's lattice of scattered light */
     struct shares shares;
     struct shadow_plan shadow_plan;
+    struct emitters emitters;
 };
 
 /* What one job asks for and gets. */

@@ -81,30 +81,43 @@ static int distant_light(const struct snapshot *snapshot)
     return !(snapshot->world.has_volume && snapshot->world.reach < 0.0f);
 }
 
-/* Everything that lights as a lamp: the scene's, and the suns of its world's image. */
+/* Everything that lights as a lamp: the scene's, the suns of its world's image, and small things that
+ * glow. */
 struct lamps {
     const struct table *table;
     brume_light suns[WORLD_SPOTS];
-    uint32_t count;
+    const struct emitters *emitters;
+    uint32_t count, sun_count;
 };
 
-static struct lamps all_lamps(const struct snapshot *snapshot, const struct world_map *map)
+static struct lamps all_lamps(const struct snapshot *snapshot, const struct world_map *map,
+                              const struct emitters *emitters)
 {
-    struct lamps lamps = {.table = &snapshot->tables[BRUME_KIND_LIGHT]};
-    lamps.count = lamps.table->count;
-    if (world_is_black(&snapshot->world) || !distant_light(snapshot))
-        return lamps;
-    for (uint32_t i = 0; i < map->spot_count; ++i)
-        world_sun(&map->spots[i], &snapshot->world, &lamps.suns[i]);
-    lamps.count += map->spot_count;
+    struct lamps lamps = {.table = &snapshot->tables[BRUME_KIND_LIGHT], .emitters = emitters};
+    if (!world_is_black(&snapshot->world) && distant_light(snapshot))
+        for (; lamps.sun_count < map->spot_count; ++lamps.sun_count)
+            world_sun(&map->spots[lamps.sun_count], &snapshot->world,
+                      &lamps.suns[lamps.sun_count]);
+    lamps.count = lamps.table->count + lamps.sun_count + emitters->count;
     return lamps;
 }
 
 static const brume_light *lamp(const struct lamps *lamps, uint32_t number)
 {
     const struct table *table = lamps->table;
-    return number < table->count ? &((struct light_block *)table->entries[number].block)->light
-                                 : &lamps->suns[number - table->count];
+    const uint32_t suns = table->count, emitters = suns + lamps->sun_count;
+    if (number < suns)
+        return &((struct light_block *)table->entries[number].block)->light;
+    return number < emitters ? &lamps->suns[number - suns]
+                             : &lamps->emitters->lamps[number - emitters];
+}
+
+/* Of an emitter one stands for all: it is small. */
+static uint32_t samples_of(const struct lamps *lamps, uint32_t number, uint32_t wanted)
+{
+    return number < lamps->table->count + lamps->sun_count
+               ? light_sample_count(lamp(lamps, number), wanted)
+               : 1;
 }
 
 static uint64_t lamp_layer_count(const struct lamps *lamps, const struct shadow_plan *plan)
@@ -113,7 +126,7 @@ static uint64_t lamp_layer_count(const struct lamps *lamps, const struct shadow_
     for (uint32_t i = 0; i < lamps->count; ++i) {
         const brume_light *light = lamp(lamps, i);
         if (light->cast_shadow)
-            layers += (uint64_t)light_sample_count(light, plan->light_samples) *
+            layers += (uint64_t)samples_of(lamps, i, plan->light_samples) *
                       faces_of(light, plan->distant);
     }
     return layers;
@@ -125,7 +138,7 @@ static brume_result allocate(struct shadows *shadows, const struct lamps *lamps,
     const uint32_t views = plan->lamp_layers + plan->world_samples * plan->distant;
     uint32_t samples = plan->world_samples;
     for (uint32_t i = 0; i < lamps->count; ++i)
-        samples += light_sample_count(lamp(lamps, i), plan->light_samples);
+        samples += samples_of(lamps, i, plan->light_samples);
     free(shadows->lights);
     free(shadows->samples);
     free(shadows->views);
@@ -146,10 +159,10 @@ static int casts(const struct geometry *geometry)
 }
 
 brume_result shadows_plan(const struct snapshot *snapshot, const struct world_map *map,
-                          const brume_settings *settings, const struct geometry *geometry,
+                          const struct emitters *emitters, const brume_settings *settings, const struct geometry *geometry,
                           uint64_t budget, struct shadow_plan *plan)
 {
-    const struct lamps all = all_lamps(snapshot, map);
+    const struct lamps all = all_lamps(snapshot, map, emitters);
     *plan = (struct shadow_plan){
         .side = settings->shadow_resolution / 2 * 2, /* quarters of whole texels */
         .light_samples = (uint32_t)settings->light_samples,
@@ -185,11 +198,11 @@ brume_result shadows_plan(const struct snapshot *snapshot, const struct world_ma
 }
 
 brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snapshot,
-                            const struct world_map *map, const brume_settings *settings,
-                            const struct geometry *geometry, const struct shadow_plan *plan,
-                            struct job_control *control)
+                            const struct world_map *map, const struct emitters *emitters,
+                            const brume_settings *settings, const struct geometry *geometry,
+                            const struct shadow_plan *plan, struct job_control *control)
 {
-    const struct lamps lamps = all_lamps(snapshot, map);
+    const struct lamps lamps = all_lamps(snapshot, map, emitters);
     const int casters = casts(geometry);
     const uint32_t wanted = plan->light_samples, world_count = plan->world_samples;
     const uint32_t distant = plan->distant;
@@ -215,7 +228,7 @@ brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snap
         light_to_gpu(light, out);
         if (light->type == BRUME_LIGHT_SUN && !distant_light(snapshot))
             out->radiance = (vec4){0};
-        const uint32_t count = light_sample_count(light, wanted);
+        const uint32_t count = samples_of(&lamps, i, wanted);
         const uint32_t faces = faces_of(light, distant);
         out->samples.x = next_sample;
         out->samples.y = count;

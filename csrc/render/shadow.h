@@ -4,7 +4,7 @@
 #ifndef BRUME_RENDER_SHADOW_H
 #define BRUME_RENDER_SHADOW_H
 
-#include "render/geometry.h"
+#include "render/emitters.h"
 #include "scene/world_map.h"
 
 struct shadows {
@@ -35,14 +35,14 @@ struct shadow_plan {
 
 /* budget: bytes that the maps may take. Arithmetic alone. */
 brume_result shadows_plan(const struct snapshot *snapshot, const struct world_map *map,
-                          const brume_settings *settings, const struct geometry *geometry,
+                          const struct emitters *emitters, const brume_settings *settings, const struct geometry *geometry,
                           uint64_t budget, struct shadow_plan *plan);
 /* Lights, samples and shadow views from the snapshot, for casters within the geometry's bounds;
  * warns where the plan falls short of the settings. */
 brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snapshot,
-                            const struct world_map *map, const brume_settings *settings,
-                            const struct geometry *geometry, const struct shadow_plan *plan,
-                            struct job_control *control);
+                            const struct world_map *map, const struct emitters *emitters,
+                            const brume_settings *settings, const struct geometry *geometry,
+                            const struct shadow_plan *plan, struct job_control *control);
 /* Uploads them: the tiles in lights[].info may have been set in between. */
 brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows);
 /* Draws the maps that differ from what their places hold, and adds to their count.

@@ -287,6 +287,8 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
         draw->base_image = base ? base->texture.id : 0;
         draw->roughness_image = rough ? rough->texture.id : 0;
         draw->opaque = material->alpha_mode == BRUME_ALPHA_OPAQUE;
+        if (is_flat(mesh) && material->emission[0] + material->emission[1] + material->emission[2] > 0.0f)
+            grow(geometry->glow_lower, geometry->glow_upper, lower, upper);
         draw->tinted = !draw->opaque &&
                        (material->transparent[0] != 1.0f || material->transparent[1] != 1.0f ||
                         material->transparent[2] != 1.0f);
@@ -305,8 +307,14 @@ static int add_bounds(struct geometry *geometry, const struct mesh_block *mesh, 
             return 0;
     grow(set_lower, set_upper, lower, upper);
     grow(geometry->lower, geometry->upper, lower, upper);
-    if (!is_flat(mesh))
+    if (!is_flat(mesh)) {
         grow(geometry->solid_lower, geometry->solid_upper, lower, upper);
+        return 1;
+    }
+    int thinnest = 0;
+    for (int i = 1; i < 3; ++i)
+        thinnest = upper[i] - lower[i] < upper[thinnest] - lower[thinnest] ? i : thinnest;
+    grow(geometry->flat_lower[thinnest], geometry->flat_upper[thinnest], lower, upper);
     return 1;
 }
 
@@ -328,8 +336,12 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
     geometry->draw_count = 0;
     geometry->triangle_count = 0;
     for (int i = 0; i < 3; ++i) {
-        geometry->lower[i] = geometry->solid_lower[i] = INFINITY;
-        geometry->upper[i] = geometry->solid_upper[i] = -INFINITY;
+        geometry->lower[i] = geometry->solid_lower[i] = geometry->glow_lower[i] = INFINITY;
+        geometry->upper[i] = geometry->solid_upper[i] = geometry->glow_upper[i] = -INFINITY;
+        for (int axis = 0; axis < 3; ++axis) {
+            geometry->flat_lower[axis][i] = INFINITY;
+            geometry->flat_upper[axis][i] = -INFINITY;
+        }
     }
     brume_result result = BRUME_OK;
     if (!instances || !geometry->draws)

@@ -48,6 +48,8 @@ struct geometry {
     float lower[3], upper[3];     /* of everything drawn; lower > upper when empty */
     /* Of all but flat meshes: what a ground plane, however wide, leaves for sharp shadows. */
     float solid_lower[3], solid_upper[3];
+    float flat_lower[3][3], flat_upper[3][3]; /* of the flat ones, by the axis they are across */
+    float glow_lower[3], glow_upper[3];       /* of those of them that glow */
 };
 
 brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,

@@ -13,6 +13,7 @@
 
 #define SKY_NODE_BYTES 24 /* three times four halves */
 #define FAR 1e30f
+#define FLAT_MOST 20.0f /* times as long as what stands among it */
 #define MOST_PARTS 4 /* of a cell's side in a lattice within */
 
 struct box {
@@ -79,6 +80,28 @@ static struct box scene_box(const struct renderer *renderer, const struct snapsh
     return box;
 }
 
+static float diagonal(const struct box *box)
+{
+    float square = 0.0f;
+    for (int i = 0; i < 3; ++i)
+        square += (box->upper[i] - box->lower[i]) * (box->upper[i] - box->lower[i]);
+    return sqrtf(square);
+}
+
+/* How far beyond a box the world's medium reaches, m; 0: by default. */
+static float fog_reach(const struct box *box, float reach)
+{
+    return reach > 0.0f ? reach : fmaxf(0.5f * diagonal(box), 1.0f);
+}
+
+/* How far beyond a box light that scattered in a medium without end hardly comes back from: twice
+ * as far as it goes, but not so far that cells become coarse. */
+static float endless_reach(const struct box *box, const vec4 *sigma_t)
+{
+    const float most = fmaxf(sigma_t->x, fmaxf(sigma_t->y, sigma_t->z));
+    return fmaxf(fog_reach(box, 0.0f), fminf(2.0f / fmaxf(most, 1e-9f), 2.0f * diagonal(box)));
+}
+
 static void layout_fog(struct renderer *renderer, const struct snapshot *snapshot, uint32_t method)
 {
     struct gpu_frame *frame = &renderer->frame;
@@ -87,13 +110,7 @@ static void layout_fog(struct renderer *renderer, const struct snapshot *snapsho
         return;
     struct box box = scene_box(renderer, snapshot);
     const int unlimited = world->reach < 0.0f;
-    float diagonal = 0.0f;
-    for (int i = 0; i < 3; ++i)
-        diagonal += (box.upper[i] - box.lower[i]) * (box.upper[i] - box.lower[i]);
-    diagonal = sqrtf(diagonal);
-    const float margin = unlimited             ? 1e7f
-                         : world->reach > 0.0f ? world->reach
-                                               : fmaxf(0.5f * diagonal, 1.0f);
+    const float margin = unlimited ? 1e7f : fog_reach(&box, world->reach);
     for (int i = 0; i < 3; ++i) {
         box.lower[i] -= margin;
         box.upper[i] += margin;
@@ -213,8 +230,59 @@ static void box_cut(struct box *box, const float lower[3], const float upper[3])
     }
 }
 
-/* Where light goes to and fro: what is solid, the media, and what of flat geometry, such as the
- * ground, is around them. With the world's medium, all that the scene shows. */
+static bool has_flat(const struct geometry *geometry, int axis)
+{
+    return geometry->flat_lower[axis][0] <= geometry->flat_upper[axis][0];
+}
+
+/* Adds what is flat, walls, floors and ceilings, if there is some across several axes: not what makes
+ * the box more than twice as long, as a wide ground does, nor all that makes what stands in the box
+ * smaller than a cell or two. */
+static void join_flat(struct box *box, const struct geometry *geometry)
+{
+    struct box whole = *box;
+    if (has_flat(geometry, 0) + has_flat(geometry, 1) + has_flat(geometry, 2) < 2)
+        return;
+    for (int axis = 0; axis < 3; ++axis) {
+        struct box others = *box, all;
+        for (int i = 0; i < 3; ++i)
+            if (i != axis && has_flat(geometry, i))
+                box_join(&others, geometry->flat_lower[i], geometry->flat_upper[i]);
+        all = others;
+        if (has_flat(geometry, axis))
+            box_join(&all, geometry->flat_lower[axis], geometry->flat_upper[axis]);
+        if (has_flat(geometry, axis) && longest(&all) < 2.0f * longest(&others))
+            box_join(&whole, geometry->flat_lower[axis], geometry->flat_upper[axis]);
+    }
+    if (box_is_empty(box) || longest(&whole) < FLAT_MOST * longest(box))
+        *box = whole;
+}
+
+/* Adds flat things that glow and what they light, as far around as they are long, and what is flat up to
+ * twice as far before or behind it. */
+static void join_glow(struct box *box, const struct geometry *geometry)
+{
+    struct box glow = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    box_join(&glow, geometry->glow_lower, geometry->glow_upper);
+    if (box_is_empty(&glow))
+        return;
+    const float length = longest(&glow);
+    struct box near = glow;
+    box_grow(&near, 2.0f * length);
+    box_grow(&glow, length);
+    for (int axis = 0; axis < 3; ++axis)
+        for (int end = 0; end < 2 && has_flat(geometry, axis); ++end) {
+            const float at = (end ? geometry->flat_upper : geometry->flat_lower)[axis][axis];
+            if (near.lower[axis] <= at && at <= near.upper[axis]) {
+                glow.lower[axis] = fminf(glow.lower[axis], at);
+                glow.upper[axis] = fmaxf(glow.upper[axis], at);
+            }
+        }
+    box_join(box, glow.lower, glow.upper);
+}
+
+/* Where light goes to and fro: what is solid, the media, flat things that glow or surround all this,
+ * and what of the ground is around them. With the world's medium, all that the scene shows. */
 static struct box field_box(const struct renderer *renderer, const struct snapshot *snapshot,
                             uint32_t method)
 {
@@ -226,9 +294,14 @@ static struct box field_box(const struct renderer *renderer, const struct snapsh
         box_join(&box, geometry->solid_lower, geometry->solid_upper);
     if (medium->dims[0])
         box_join(&box, medium->lower, medium->upper);
-    if (fog && method == BRUME_METHOD_DOM && renderer->frame.fog_upper.w == 0.0f) {
-        const vec4 low = renderer->frame.fog_lower, high = renderer->frame.fog_upper;
-        return (struct box){{low.x, low.y, low.z}, {high.x, high.y, high.z}};
+    join_glow(&box, geometry);
+    join_flat(&box, geometry);
+    if (fog && method == BRUME_METHOD_DOM) {
+        struct box filled = scene_box(renderer, snapshot);
+        box_grow(&filled, renderer->frame.fog_upper.w != 0.0f
+                              ? endless_reach(&filled, &renderer->frame.fog_sigma_t)
+                              : fog_reach(&filled, snapshot->world.reach));
+        return filled;
     }
     if (box_is_empty(&box))
         return fog ? scene_box(renderer, snapshot) : box;

@@ -112,12 +112,12 @@ static const brume_light *lamp(const struct lamps *lamps, uint32_t number)
                              : &lamps->emitters->lamps[number - emitters];
 }
 
-/* Of an emitter one stands for all: it is small. */
+/* Emitters, which are small and may be many, share what one lamp has. */
 static uint32_t samples_of(const struct lamps *lamps, uint32_t number, uint32_t wanted)
 {
-    return number < lamps->table->count + lamps->sun_count
-               ? light_sample_count(lamp(lamps, number), wanted)
-               : 1;
+    if (number >= lamps->table->count + lamps->sun_count)
+        wanted /= lamps->emitters->count;
+    return light_sample_count(lamp(lamps, number), wanted);
 }
 
 static uint64_t lamp_layer_count(const struct lamps *lamps, const struct shadow_plan *plan)

@@ -118,7 +118,7 @@ static void glowing_thing(void **state)
     brume_scene_destroy(scene);
 }
 
-/* Boxes about as large as a cell, anywhere in it: light in the room but for the cells around them. It
+/* Boxes larger than lamps stand for, anywhere in it: light in the room but for the cells around them. It
  * is right in the mean; of one box it depends on how many lines meet it. */
 static void small_things_glow(void **state)
 {
@@ -126,7 +126,7 @@ static void small_things_glow(void **state)
     enum { CELLS = 16, PLACES = 12 };
     static const struct {
         double side, worst, mean; /* in cells */
-    } cases[] = {{0.55, 0.45, 0.05}, {0.75, 0.35, 0.05}, {1.5, 0.20, 0.05}};
+    } cases[] = {{1.7, 0.20, 0.05}, {2.0, 0.25, 0.20}};
     const brume_material glowing = {.emission = {1, 1, 1}, .roughness = 1, .alpha = 1};
     const brume_settings settings = settings_for(CELLS);
     for (size_t n = 0; n < sizeof cases / sizeof *cases; ++n) {
@@ -173,7 +173,7 @@ static void small_things_glow(void **state)
     }
 }
 
-/* --- Lamps for what is smaller than half a cell ----------------------------------------------- */
+/* --- Lamps for what is no larger than a cell or so -------------------------------------------- */
 
 enum { FLOOR_CELLS = 16, PIXELS = 24, RINGS = 8, AROUND = 12, COPIES = 2 };
 
@@ -277,7 +277,7 @@ static void small_things_light_a_floor(void **state)
 {
     (void)state;
     static const struct shape shapes[] = {
-        {"a ball", {0.03f, 0.03f, 0.03f}, true, 1, 1, 0.08},
+        {"a ball", {0.06f, 0.06f, 0.06f}, true, 1, 1, 0.08},
         {"a ball of a sixtieth of a cell", {0.001f, 0.001f, 0.001f}, true, 1, 1, 0.08},
         {"a square, both sides", {0.025f, 0.025f, 0}, false, 1, 1, 0.08},
         {"a panel", {0.025f, 0.02f, 0.0005f}, false, 1, 1, 0.08},

@@ -354,7 +354,9 @@ typedef struct brume_material {
     uint32_t alpha_mode;
     uint32_t alpha_from_base_image;
     uint32_t backface_culling;
-    uint32_t reserved;
+    float burley;                    /* share of `diffuse` that is rougher and brighter at grazing
+                                        angles, as Principled BSDF before Blender 4 (Burley,
+                                        "Physically-Based Shading at Disney", 2012); 0: Lambert */
 } brume_material;
 
 BRUME_API brume_result brume_scene_set_material(brume_scene *scene, uint64_t key,

@@ -12,7 +12,7 @@ flat in uint visibility;
 layout(location = 0) out vec4 out_normal;   // world normal; view depth
 layout(location = 1) out vec4 out_diffuse;  // reflectance; roughness
 layout(location = 2) out vec4 out_specular; // F0; 1 where the surface is a holdout
-layout(location = 3) out vec4 out_emission;
+layout(location = 3) out vec4 out_emission; // w: share of the diffuse that is Burley's
 
 void main()
 {
@@ -46,5 +46,5 @@ void main()
     out_normal = vec4(normal, depth);
     out_diffuse = vec4(material.diffuse.rgb * base.rgb, clamp(roughness, 0.0, 1.0));
     out_specular = vec4(material.specular.rgb + material.metal.rgb * base.rgb, holdout ? 1.0 : 0.0);
-    out_emission = vec4(min(material.emission.rgb, vec3(65504.0)), 0.0); // what halves hold
+    out_emission = vec4(min(material.emission.rgb, vec3(65504.0)), material.emission.w); // what halves hold
 }

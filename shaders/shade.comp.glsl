@@ -132,7 +132,7 @@ vec3 field_surface(surface s, vec3 p, vec3 near)
     if (left <= 0.0)
         return vec3(0.0);
     field_light light = field_at(q, s.normal, s.view, frame.field.x - 1);
-    return left * (s.diffuse * near * field_irradiance(light, s.normal) / PI +
+    return left * (bsdf_diffuse_mean(s) * near * field_irradiance(light, s.normal) / PI +
                    s.specular * field_radiance(light, reflect(-s.view, s.normal)));
 }
 
@@ -152,6 +152,7 @@ void main()
         s.diffuse = diffuse.rgb;
         s.roughness = diffuse.w;
         s.specular = texelFetch(gbuffer_specular, pixel, 0).rgb;
+        s.burley = texelFetch(gbuffer_emission, pixel, 0).w;
         vec3 p = ray.origin + ray.direction * (normal_depth.w * ray.stretch);
         uint i = 0u;
         if (frame.counts.x > 0u) do

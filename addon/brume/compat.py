@@ -128,6 +128,11 @@ def light_is_portal(light):
 LIGHT_PROPERTIES = ("exposure", "normalize", "use_temperature", "temperature")
 
 
+def principled_is_burley():
+    """Until 4.0 the diffuse part of Principled BSDF was Burley's, after that Lambert's."""
+    return bpy.app.version < (4, 0, 0)
+
+
 def has_blend_method():
     """4.2 took EEVEE's blend methods away."""
     return bpy.app.version < (4, 2, 0)

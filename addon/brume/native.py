@@ -137,7 +137,7 @@ class Material(Structure):
                 ("transparent", Vec3), ("roughness", c_float), ("alpha", c_float),
                 ("alpha_threshold", c_float), ("alpha_mode", c_uint32),
                 ("alpha_from_base_image", c_uint32), ("backface_culling", c_uint32),
-                ("reserved", c_uint32)]
+                ("burley", c_float)]
 
 
 class Image(Structure):
@@ -500,11 +500,11 @@ class Scene(Handle):
 
     def set_material(self, key, *, name, diffuse, specular, metal, emission, transparent,
                      roughness, alpha, alpha_mode, alpha_threshold=0.5, base_image=0,
-                     roughness_image=0, alpha_from_base_image=False):
+                     roughness_image=0, alpha_from_base_image=False, burley=0.0):
         library().scene_set_material(self.pointer, key, byref(Material(
             name.encode(), base_image, roughness_image, Vec3(*diffuse), Vec3(*specular),
             Vec3(*metal), Vec3(*emission), Vec3(*transparent), roughness, alpha, alpha_threshold,
-            ALPHA[alpha_mode], alpha_from_base_image)))
+            ALPHA[alpha_mode], alpha_from_base_image, False, burley)))
 
     def set_image(self, key, *, name, pixels, extend="REPEAT", nearest=False):
         """pixels: (height, width, 4)."""

@@ -176,7 +176,7 @@ static struct gpu_material material_to_gpu(const struct geometry *geometry, cons
         .diffuse = pack(m->diffuse, m->roughness),
         .specular = pack(m->specular, m->alpha),
         .metal = pack(m->metal, m->alpha_threshold > 0.0f ? m->alpha_threshold : 0.5f),
-        .emission = pack(m->emission, 0.0f),
+        .emission = pack(m->emission, fminf(fmaxf(m->burley, 0.0f), 1.0f)),
         .transparent = pack(m->transparent, 0.0f),
     };
     const struct gpu_image *base = geometry_image(geometry, m->base_image);

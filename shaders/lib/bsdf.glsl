@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reflection of a surface: Lambert, and GGX with Schlick's Fresnel.
+// Reflection of a surface: Lambert or Burley, and GGX with Schlick's Fresnel.
 
 struct surface
 {
@@ -8,6 +8,7 @@ struct surface
     vec3 diffuse;
     vec3 specular;  // F0
     float roughness;
+    float burley;   // share of diffuse that is Burley's instead of Lambert's
 };
 
 // Schlick's approximation; cosine between view and half vector. Lambert surfaces have F0 = 0 and no
@@ -83,7 +84,31 @@ vec3 bsdf_sample(surface s, vec2 lot, out vec3 light, out float density)
                                               (mask_v + bsdf_masking(nl, alpha2)));
 }
 
+// Burley's factor over Lambert's: `retro` is twice the roughness times the squared cosine to the half vector,
+// less 1/2 (Burley, "Physically-Based Shading at Disney", SIGGRAPH 2012 course, sec. 5.3).
+float burley_factor(float retro, float rim_light, float rim_view)
+{
+    return (1.0 + retro * rim_light) * (1.0 + retro * rim_view);
+}
+
+float rim(float cosine)
+{
+    return pow(1.0 - clamp(cosine, 0.0, 1.0), 5.0);
+}
+
 vec3 bsdf_diffuse(surface s, vec3 light)
 {
-    return s.diffuse * (max(dot(s.normal, light), 0.0) / 3.14159265358979);
+    float nl = max(dot(s.normal, light), 0.0);
+    float retro = s.roughness * (1.0 + dot(light, s.view)) - 0.5;
+    float factor = mix(1.0, burley_factor(retro, rim(nl), rim(dot(s.normal, s.view))), s.burley);
+    return s.diffuse * (factor * nl / 3.14159265358979);
+}
+
+// What is reflected of light that is alike from everywhere: the mean of the light's rim over its cosine is
+// 1/21, of its cosine to the view 2/3 of the view's to the normal.
+vec3 bsdf_diffuse_mean(surface s)
+{
+    float nv = clamp(dot(s.normal, s.view), 0.0, 1.0);
+    float retro = s.roughness * (1.0 + nv * (2.0 / 3.0)) - 0.5;
+    return s.diffuse * mix(1.0, burley_factor(retro, 1.0 / 21.0, rim(nv)), s.burley);
 }

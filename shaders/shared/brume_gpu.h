@@ -221,7 +221,7 @@ struct gpu_material {
     vec4 diffuse;      /* w: roughness */
     vec4 specular;     /* w: alpha */
     vec4 metal;        /* w: alpha threshold */
-    vec4 emission;
+    vec4 emission;     /* w: share of the diffuse that is Burley's */
     vec4 transparent;
     uvec4 flags;
     vec4 padding[10]; /* a device may want uniform blocks to begin at multiples of 256 bytes */

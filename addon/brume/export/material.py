@@ -29,6 +29,7 @@ class Lobe:
     color: Color
     weight: np.ndarray   # three numbers
     roughness: Color = field(default_factory=lambda: Color(np.zeros(3)))
+    burley: bool = False # diffuse: Burley's instead of Lambert's
     f0: bool = False     # glossy: its colour is the dielectric's F0, which no image multiplies
 
 
@@ -205,7 +206,8 @@ def _principled(walk, source, weight):
     rough = builder.color(source.input("Roughness"))
     specular = builder.scalar(_first(source, "Specular", "Specular IOR Level"))
     if metallic < 1.0:
-        walk.add("diffuse", base, weight * (1.0 - metallic))
+        walk.add("diffuse", base, weight * (1.0 - metallic), roughness=rough,
+                 burley=compat.principled_is_burley())
         if specular > 0.0:
             walk.add("glossy", Color(np.full(3, 0.08 * specular)), weight * (1.0 - metallic),
                      roughness=rough, f0=True)
@@ -253,6 +255,7 @@ def _gather(walk):
     base, channel = _base_texture(walk)
     through, solid = np.zeros(3), 0.0
     rough_sum, rough_weight, rough_texture = 0.0, 0.0, None
+    burley_sum, burley_rough = 0.0, None
     for lobe in walk.lobes:
         amount = lobe.color.factor * lobe.weight
         textured = lobe.color.texture is not None and lobe.color.texture == base
@@ -269,6 +272,9 @@ def _gather(walk):
             if base and not textured and channel != "W":
                 walk.warn("the diffuse colour is multiplied by the material's image.")
             sums["diffuse"] += amount
+            if lobe.burley:
+                burley_sum += float(np.mean(amount))
+                burley_rough = burley_rough or lobe.roughness
         else:
             sums["metal" if textured else "specular"] += amount
             share = float(np.mean(amount))
@@ -278,7 +284,11 @@ def _gather(walk):
     if len({float(lobe.roughness.factor[0]) for lobe in walk.lobes if lobe.kind == "glossy"}) > 1:
         walk.warn("glossy parts of different roughness are shown with their mean.")
     roughness = rough_sum / rough_weight if rough_weight else 0.5
-    return sums, base, channel, through, solid, roughness, rough_texture
+    if not rough_weight and burley_rough:
+        roughness = float(burley_rough.factor[0])
+        rough_texture = burley_rough.texture and burley_rough
+    burley = burley_sum / max(float(np.mean(sums["diffuse"])), 1e-20)
+    return sums, base, channel, through, solid, roughness, rough_texture, burley
 
 
 def _cover(through, solid):
@@ -336,7 +346,7 @@ def _export(target, material, key):
         walk.closure(place, np.ones(3))
     if nodes.output_source(tree, "Displacement"):
         walk.warn("displacement is not shown.")
-    sums, base, channel, through, solid, roughness, rough = _gather(walk)
+    sums, base, channel, through, solid, roughness, rough, burley = _gather(walk)
     alpha, passes = _cover(through, solid)
     if alpha > 0.0:
         sums = {name: value / alpha for name, value in sums.items()}
@@ -349,4 +359,4 @@ def _export(target, material, key):
         alpha_threshold=getattr(material, "alpha_threshold", 0.5) or 0.5,
         base_image=image.export(target, base, channel) if base else 0,
         roughness_image=image.export(target, rough.texture, rough.channel or "L") if rough else 0,
-        alpha_from_base_image=walk.mask is not None)
+        alpha_from_base_image=walk.mask is not None, burley=burley)

@@ -53,6 +53,20 @@ def test_diffuse(lobes):
     assert block["alpha_mode"] == 'OPAQUE'
 
 
+def test_diffuse_part_of_principled(lobes):
+    old = bpy.app.version < (4, 0, 0)
+
+    def half(n):
+        matt = n.node("BsdfPrincipled", Base_Color=(0.4, 0.4, 0.4, 1), Specular=0.0, Roughness=0.7)
+        plain = n.node("BsdfDiffuse", Color=(0.8, 0.8, 0.8, 1))
+        return n.node("MixShader", Fac=0.5, Shader=matt, Shader_001=plain)
+    block = lobes(half)
+    close(block["diffuse"], 0.6)
+    close(block["burley"], 0.2 / 0.6 if old else 0.0)
+    if old:  # it has nothing glossy that says how rough it is
+        close(block["roughness"], 0.7)
+
+
 def test_glossy(lobes):
     block = lobes(lambda n: n.node("BsdfGlossy", Color=(0.1, 0.2, 0.3, 1), Roughness=0.3))
     close(block["specular"], (0.1, 0.2, 0.3))

@@ -451,6 +451,21 @@ def test_material_override(scene, export):
     assert [m["name"] for m in recorder.of("material")] == ["Clay"]
 
 
+def test_visibility_that_means_nothing_is_named(scene, export, target):
+    usual, hidden = (cube(name, material=fog(name)) for name in ("Usual", "Hidden"))
+    catcher, kept = cube("Catcher"), cube("Kept")
+    usual.visible_glossy = False  # what mirrors show of media is the lattice's
+    hidden.visible_camera = hidden.visible_shadow = False
+    catcher.is_shadow_catcher = True
+    kept.visible_diffuse = False
+    export()
+    sentences = [sentence for _, sentence in target.reports]
+    assert len(sentences) == 3
+    assert any("Hidden" in s and "Camera, Shadow under" in s for s in sentences)
+    assert any("Catcher" in s and "shadow catcher" in s for s in sentences)
+    assert any("Kept" in s and "Diffuse" in s for s in sentences)
+
+
 def test_what_is_not_shown_is_named(scene, export, target):
     add("Hair", bpy.data.hair_curves.new("Hair"))
     export()

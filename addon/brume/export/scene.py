@@ -161,6 +161,7 @@ class _Export:
     def volume(self, instance, ob, matrix):
         if ob.data is None:  # evaluated to nothing
             return
+        self.medium_visibility(ob)
         volume.export_volume_object(
             self.target, ob, matrix, key_of_datablock(ob, "volume", *_path(instance)),
             self.makers(instance, ob), self.override)
@@ -198,6 +199,8 @@ class _Export:
                 if slot not in self.drawn:
                     self.drawn.add(slot)
                     material.export(self.target, slot.material)
+        if shape.mesh is not None:
+            self.surface_visibility(ob)
         thing = _Thing(mesh=shape.mesh, visibility=self.visibility(ob))
         if shape.medium is not None:
             medium = slots[shape.medium]
@@ -221,6 +224,7 @@ class _Export:
         return self.families
 
     def medium(self, instance, ob, matrix, shape, medium, reads):
+        self.medium_visibility(ob)
         key = key_of_datablock(ob, "medium", *_path(instance))
         stamp = (ob.name, matrix.tobytes(), medium.identity, shape.serial,
                  tuple(map(tuple, ob.bound_box)))
@@ -233,6 +237,30 @@ class _Export:
                 volume.export_mesh_volume(self.target, ob, shape.arrays, medium.material, matrix,
                                           key)
         self.target.part(("medium", key), stamp, reads, make)
+
+    def surface_visibility(self, ob):
+        """Names what a surface cannot be kept from."""
+        if ob.is_shadow_catcher:
+            self.target.reports.unsupported(f'Object "{ob.name}"', "a shadow catcher is shown as "
+                                                                   "an ordinary surface.")
+        if not (ob.visible_diffuse and ob.visible_volume_scatter):
+            self.target.reports.unsupported(
+                f'Object "{ob.name}"', "what it reflects lights all others: Ray Visibility to "
+                                       "Diffuse and Volume Scatter is that of lamps alone.")
+
+    def medium_visibility(self, ob):
+        """Names what a volume cannot be kept from: all of them are one medium."""
+        original = ob.original
+        kept = {"Camera": ob.visible_camera, "Diffuse": ob.visible_diffuse,
+                "Volume Scatter": ob.visible_volume_scatter, "Shadow": ob.visible_shadow,
+                "Holdout": not (ob.is_holdout or
+                                original.holdout_get(view_layer=self.view_layer)),
+                "Indirect Only": not original.indirect_only_get(view_layer=self.view_layer)}
+        named = [name for name, usual in kept.items() if not usual]
+        if named:
+            self.target.reports.unsupported(
+                f'Object "{ob.name}"', f"its volume is seen, lit and casts shadows as all others: "
+                                       f"{', '.join(named)} under Visibility means nothing to it.")
 
     def visibility(self, ob):
         original = ob.original

@@ -135,6 +135,20 @@ vec3 step_weight_at(vec3 sigma_t, vec3 through, float dt, float within, float ch
     return mix(step_weight(sigma_t, through, dt), dt * exp(-sigma_t * (within * dt)), chosen);
 }
 
+// A place in a step that is as likely as what is there is seen through the step's thinnest colour: in thick
+// media, where a step is many free paths long, the light at its beginning is all that counts. `within`, a place
+// from 0 to 1, becomes it; `weight`: what light there counts of the step's integral, by colours.
+void see_into(vec3 sigma_t, vec3 through, float dt, inout float within, out vec3 weight)
+{
+    float depth = min(min(sigma_t.r, sigma_t.g), sigma_t.b) * dt, seen = 1.0 - exp(-depth);
+    if (depth < 0.1) {
+        weight = step_weight(sigma_t, through, dt);
+        return;
+    }
+    within = min(-log(1.0 - within * seen) / depth, 1.0);
+    weight = exp((depth - sigma_t * dt) * within) * (dt * seen / depth);
+}
+
 // What is left behind this could no longer be told from black.
 bool is_black(vec3 transmittance)
 {
@@ -202,8 +216,11 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, b
     vec3 sharp_through = exp(-sharp_t * dt);
 #endif
     float falloff = 1.0, uneven = 0.0;
+    vec3 weight = vec3(0.0);
     if (!lamp.sun)
         falloff = mean_inverse_square(t0 - lamp.along, dt, lamp.h, within, uneven);
+    else
+        see_into(m.sigma_t, through, dt, within, weight);
     vec3 p = ray.origin + ray.direction * (t0 + within * dt);
     vec3 there = through;
 #ifdef DOM
@@ -236,11 +253,16 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, b
 #ifdef DOM
         float soft = phase_soft(cosine, m.g);
         float peak = phase_peak(cosine, m.g, times_forward(m, depth.rgb), depth.a);
-        sum = here * (reach.soft * step_weight_at(m.sigma_t, there, dt, within, uneven) * soft +
-                      reach.sharp * step_weight_at(sharp_t, sharp_there, dt, within, uneven) * peak);
+        // In the peak the step is denser than in what its place was chosen by, and its weight the lesser.
+        vec3 sharp = lamp.sun ? weight * exp((m.sigma_t - sharp_t) * (within * dt))
+                              : step_weight_at(sharp_t, sharp_there, dt, within, uneven);
+        if (!lamp.sun)
+            weight = step_weight_at(m.sigma_t, there, dt, within, uneven);
+        sum = here * (reach.soft * weight * soft + reach.sharp * sharp * peak);
 #else
-        sum = here * reach.soft * step_weight_at(m.sigma_t, there, dt, within, uneven) *
-              phase_hg(cosine, m.g);
+        if (!lamp.sun)
+            weight = step_weight_at(m.sigma_t, there, dt, within, uneven);
+        sum = here * reach.soft * weight * phase_hg(cosine, m.g);
 #endif
     }
     reach.soft *= through;
@@ -343,6 +365,7 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             look_up_scatter(ray.origin + ray.direction * t, in_lattice, m);
             vec3 through = exp(-m.sigma_t * dt);
             vec3 weight = transmittance * step_weight(m.sigma_t, through, dt);
+            state.emission += weight * m.emission;
             scattered = weight * m.sigma_s;
 #ifndef DOM
             if (frame.sky_dims.w != 0 && frame.paths.x != 0) {
@@ -355,6 +378,12 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
             }
 #endif
             if (with_field) {
+                if (field_steps == 1) {
+                    float place = within;
+                    see_into(m.sigma_t, through, dt, place, weight);
+                    scattered = transmittance * weight * m.sigma_s;
+                    t = t0 + place * dt;
+                }
                 if (k >= field_next) {
                     p = middle_of(ray, t, field_steps, dt, span.y);
 #ifdef DOM
@@ -367,7 +396,6 @@ void march(inout march_state state, view_ray ray, vec2 span, int count, bool in_
                 if (open)
                     state.indirect += scattered * field;
             }
-            state.emission += weight * m.emission;
 #ifdef LAMPS
             lamp_sum += lamp_step(lamp, ray, m, true, in_lattice, t0, within, dt, reach);
 #endif

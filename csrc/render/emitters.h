@@ -7,7 +7,7 @@
 
 #include "render/geometry.h"
 
-#define EMITTERS_MOST 32 /* lamps: each is a ray and its maps in every step of the march */
+#define EMITTERS_MOST 24 /* lamps: each is a ray in every step of the march, and six shadow maps */
 
 struct emitters {
     brume_light lamps[EMITTERS_MOST];
@@ -16,9 +16,9 @@ struct emitters {
     uint64_t key;       /* of what they were found in */
 };
 
-/* Finds them, if geometry (its revision says) or frame's lattices changed, or `wanted`, without
- * which there are none; and marks the draws that they stand for, which light nothing and cast no
- * shadow then. */
+/* Finds them, if geometry (its revision says), the size of the frame's cells or `wanted` changed,
+ * without which there are none; and marks the draws that they stand for, which light nothing and
+ * cast no shadow then. */
 void emitters_update(struct emitters *emitters, struct geometry *geometry,
                      const struct snapshot *snapshot, const struct gpu_frame *frame,
                      uint64_t revision, int wanted);

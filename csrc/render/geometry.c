@@ -254,6 +254,26 @@ static void write_instance(struct gpu_instance *out, const float *world_from_obj
     out->flags = (uvec4){visibility, number, 0, 0};
 }
 
+static int glows(const brume_material *material)
+{
+    const float *e = material->emission;
+    return e[0] > 0.0f || e[1] > 0.0f || e[2] > 0.0f;
+}
+
+/* Whether some of a mesh's instances light others. */
+static int any_glows(const struct snapshot *snapshot, const struct mesh_block *mesh,
+                     uint32_t visibility)
+{
+    const struct table *materials = &snapshot->tables[BRUME_KIND_MATERIAL];
+    for (uint32_t slot = 0; slot < mesh->slot_count && visibility & BRUME_VISIBLE_SHADOW; ++slot) {
+        const struct entry *entry = table_find(materials, mesh->materials[slot]);
+        if (entry && mesh->slot_first[slot] < mesh->slot_first[slot + 1] &&
+            glows(&((struct material_block *)entry->block)->material))
+            return 1;
+    }
+    return 0;
+}
+
 static void add_draws(struct geometry *geometry, const struct snapshot *snapshot,
                       const struct mesh_block *mesh, const struct gpu_mesh *gpu_mesh,
                       const struct entry *set, const float lower[3],
@@ -287,18 +307,31 @@ static void add_draws(struct geometry *geometry, const struct snapshot *snapshot
         draw->base_image = base ? base->texture.id : 0;
         draw->roughness_image = rough ? rough->texture.id : 0;
         draw->opaque = material->alpha_mode == BRUME_ALPHA_OPAQUE;
-        if (is_flat(mesh) && material->emission[0] + material->emission[1] + material->emission[2] > 0.0f)
-            grow(geometry->glow_lower, geometry->glow_upper, lower, upper);
+        draw->glows = glows(material) && draw->visibility & BRUME_VISIBLE_SHADOW;
         draw->tinted = !draw->opaque &&
                        (material->transparent[0] != 1.0f || material->transparent[1] != 1.0f ||
                         material->transparent[2] != 1.0f);
     }
 }
 
+/* What something flat that glows lights: as far around it as it is long, twice as far before it. */
+static void add_glow(struct geometry *geometry, int across, const float lower[3],
+                     const float upper[3])
+{
+    float length = 0.0f, from[3], to[3];
+    for (int i = 0; i < 3; ++i)
+        length = fmaxf(length, upper[i] - lower[i]);
+    for (int i = 0; i < 3; ++i) {
+        from[i] = lower[i] - (i == across ? 2.0f : 1.0f) * length;
+        to[i] = upper[i] + (i == across ? 2.0f : 1.0f) * length;
+    }
+    grow(geometry->glow_lower, geometry->glow_upper, from, to);
+}
+
 /* To the scene's and the set's. False where finite vertices and a finite matrix make a place that
  * no number holds. */
 static int add_bounds(struct geometry *geometry, const struct mesh_block *mesh, const float *matrix,
-                      float set_lower[3], float set_upper[3])
+                      int glowing, float set_lower[3], float set_upper[3])
 {
     float lower[3], upper[3];
     mat4_bounds(matrix, mesh->lower, mesh->upper, lower, upper);
@@ -315,6 +348,8 @@ static int add_bounds(struct geometry *geometry, const struct mesh_block *mesh, 
     for (int i = 1; i < 3; ++i)
         thinnest = upper[i] - lower[i] < upper[thinnest] - lower[thinnest] ? i : thinnest;
     grow(geometry->flat_lower[thinnest], geometry->flat_upper[thinnest], lower, upper);
+    if (glowing)
+        add_glow(geometry, thinnest, lower, upper);
     return 1;
 }
 
@@ -358,11 +393,12 @@ static brume_result sync_instances(struct gpu *gpu, struct geometry *geometry,
         if (mesh->triangle_count == 0)
             continue;
         const uint32_t first = next;
+        const int glowing = any_glows(snapshot, mesh, set->visibility);
         float lower[3] = {INFINITY, INFINITY, INFINITY};
         float upper[3] = {-INFINITY, -INFINITY, -INFINITY};
         for (uint32_t k = 0; k < set->count; ++k) {
             const float *matrix = set->world_from_object + 16 * (size_t)k;
-            if (!add_bounds(geometry, mesh, matrix, lower, upper))
+            if (!add_bounds(geometry, mesh, matrix, glowing, lower, upper))
                 continue;
             write_instance(&instances[next], matrix, set->visibility, next);
             ++next;

@@ -30,6 +30,7 @@ struct draw {
     uint32_t visibility;
     uint64_t mesh, set; /* keys */
     int as_lamps; /* lamps stand for it: seen, it lights nothing and casts no shadow */
+    int glows;  /* and lights others */
     int tinted; /* colours what is seen through it */
     int opaque; /* all of it covers what is behind */
 };
@@ -49,7 +50,7 @@ struct geometry {
     /* Of all but flat meshes: what a ground plane, however wide, leaves for sharp shadows. */
     float solid_lower[3], solid_upper[3];
     float flat_lower[3][3], flat_upper[3][3]; /* of the flat ones, by the axis they are across */
-    float glow_lower[3], glow_upper[3];       /* of those of them that glow */
+    float glow_lower[3], glow_upper[3];       /* of what those of them light that glow */
 };
 
 brume_result geometry_sync(struct gpu *gpu, struct geometry *geometry,

@@ -60,6 +60,16 @@ static uint64_t texels_of(const ivec4 *dims)
            (uint64_t)texture_side(dims->z);
 }
 
+static void join_lamps(struct box *box, const struct snapshot *snapshot)
+{
+    const struct table *lights = &snapshot->tables[BRUME_KIND_LIGHT];
+    for (uint32_t i = 0; i < lights->count; ++i) {
+        const brume_light *light = &((struct light_block *)lights->entries[i].block)->light;
+        if (light->type != BRUME_LIGHT_SUN)
+            box_join(box, light->world_from_light + 12, light->world_from_light + 12);
+    }
+}
+
 /* Everything that the scene shows, lamps included: what the world's medium should fill. */
 static struct box scene_box(const struct renderer *renderer, const struct snapshot *snapshot)
 {
@@ -69,12 +79,7 @@ static struct box scene_box(const struct renderer *renderer, const struct snapsh
         box_join(&box, geometry->lower, geometry->upper);
     if (renderer->medium.dims[0])
         box_join(&box, renderer->medium.lower, renderer->medium.upper);
-    const struct table *lights = &snapshot->tables[BRUME_KIND_LIGHT];
-    for (uint32_t i = 0; i < lights->count; ++i) {
-        const brume_light *light = &((struct light_block *)lights->entries[i].block)->light;
-        if (light->type != BRUME_LIGHT_SUN)
-            box_join(&box, light->world_from_light + 12, light->world_from_light + 12);
-    }
+    join_lamps(&box, snapshot);
     if (box_is_empty(&box))
         box = (struct box){{-10, -10, -10}, {10, 10, 10}};
     return box;
@@ -88,20 +93,6 @@ static float diagonal(const struct box *box)
     return sqrtf(square);
 }
 
-/* How far beyond a box the world's medium reaches, m; 0: by default. */
-static float fog_reach(const struct box *box, float reach)
-{
-    return reach > 0.0f ? reach : fmaxf(0.5f * diagonal(box), 1.0f);
-}
-
-/* How far beyond a box light that scattered in a medium without end hardly comes back from: twice
- * as far as it goes, but not so far that cells become coarse. */
-static float endless_reach(const struct box *box, const vec4 *sigma_t)
-{
-    const float most = fmaxf(sigma_t->x, fmaxf(sigma_t->y, sigma_t->z));
-    return fmaxf(fog_reach(box, 0.0f), fminf(2.0f / fmaxf(most, 1e-9f), 2.0f * diagonal(box)));
-}
-
 static void layout_fog(struct renderer *renderer, const struct snapshot *snapshot, uint32_t method)
 {
     struct gpu_frame *frame = &renderer->frame;
@@ -110,7 +101,9 @@ static void layout_fog(struct renderer *renderer, const struct snapshot *snapsho
         return;
     struct box box = scene_box(renderer, snapshot);
     const int unlimited = world->reach < 0.0f;
-    const float margin = unlimited ? 1e7f : fog_reach(&box, world->reach);
+    const float margin = unlimited             ? 1e7f
+                         : world->reach > 0.0f ? world->reach
+                                               : fmaxf(0.5f * diagonal(&box), 1.0f);
     for (int i = 0; i < 3; ++i) {
         box.lower[i] -= margin;
         box.upper[i] += margin;
@@ -230,6 +223,20 @@ static void box_cut(struct box *box, const float lower[3], const float upper[3])
     }
 }
 
+/* Of a medium without end what light hardly comes back from behind: twice as far around what stands in
+ * it, lamps included, as light goes, but not so far that cells become coarse. */
+static struct box endless_box(const struct renderer *renderer, const struct snapshot *snapshot,
+                              struct box box)
+{
+    const vec4 sigma = renderer->frame.fog_sigma_t;
+    const float most = fmaxf(fmaxf(sigma.x, fmaxf(sigma.y, sigma.z)), 1e-9f);
+    join_lamps(&box, snapshot);
+    if (box_is_empty(&box))
+        box = scene_box(renderer, snapshot);
+    box_grow(&box, fminf(2.0f / most, fmaxf(3.0f * diagonal(&box), 1.0f)));
+    return box;
+}
+
 static bool has_flat(const struct geometry *geometry, int axis)
 {
     return geometry->flat_lower[axis][0] <= geometry->flat_upper[axis][0];
@@ -258,27 +265,17 @@ static void join_flat(struct box *box, const struct geometry *geometry)
         *box = whole;
 }
 
-/* Adds flat things that glow and what they light, as far around as they are long, and what is flat up to
- * twice as far before or behind it. */
+/* Adds what flat things that glow light, as far as there is anything. */
 static void join_glow(struct box *box, const struct geometry *geometry)
 {
-    struct box glow = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    struct box whole = *box, glow = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     box_join(&glow, geometry->glow_lower, geometry->glow_upper);
     if (box_is_empty(&glow))
         return;
-    const float length = longest(&glow);
-    struct box near = glow;
-    box_grow(&near, 2.0f * length);
-    box_grow(&glow, length);
-    for (int axis = 0; axis < 3; ++axis)
-        for (int end = 0; end < 2 && has_flat(geometry, axis); ++end) {
-            const float at = (end ? geometry->flat_upper : geometry->flat_lower)[axis][axis];
-            if (near.lower[axis] <= at && at <= near.upper[axis]) {
-                glow.lower[axis] = fminf(glow.lower[axis], at);
-                glow.upper[axis] = fmaxf(glow.upper[axis], at);
-            }
-        }
-    box_join(box, glow.lower, glow.upper);
+    box_cut(&glow, geometry->lower, geometry->upper);
+    box_join(&whole, glow.lower, glow.upper);
+    if (box_is_empty(box) || longest(&whole) < FLAT_MOST * longest(box))
+        *box = whole;
 }
 
 /* Where light goes to and fro: what is solid, the media, flat things that glow or surround all this,
@@ -294,14 +291,13 @@ static struct box field_box(const struct renderer *renderer, const struct snapsh
         box_join(&box, geometry->solid_lower, geometry->solid_upper);
     if (medium->dims[0])
         box_join(&box, medium->lower, medium->upper);
-    join_glow(&box, geometry);
+    if (method == BRUME_METHOD_DOM) /* else it lights nothing */
+        join_glow(&box, geometry);
     join_flat(&box, geometry);
     if (fog && method == BRUME_METHOD_DOM) {
-        struct box filled = scene_box(renderer, snapshot);
-        box_grow(&filled, renderer->frame.fog_upper.w != 0.0f
-                              ? endless_reach(&filled, &renderer->frame.fog_sigma_t)
-                              : fog_reach(&filled, snapshot->world.reach));
-        return filled;
+        const vec4 low = renderer->frame.fog_lower, high = renderer->frame.fog_upper;
+        return high.w != 0.0f ? endless_box(renderer, snapshot, box)
+                              : (struct box){{low.x, low.y, low.z}, {high.x, high.y, high.z}};
     }
     if (box_is_empty(&box))
         return fog ? scene_box(renderer, snapshot) : box;

@@ -29,6 +29,9 @@ static void place_in_polygon(uint32_t corners, double turn, double within, doubl
 
 void lens_offset(const brume_lens *lens, uint32_t index, uint32_t count, float offset[2])
 {
+    offset[0] = offset[1] = 0.0f;
+    if (count == 1)
+        return; /* the middle stands for all */
     /* Vogel's spiral: "A better way to construct the sunflower head", Mathematical Biosciences
      * 1979. Not from its middle on, so that any first part of it stands for all. */
     const uint64_t number = (uint64_t)index * spread_step(count) % count;

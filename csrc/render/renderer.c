@@ -206,6 +206,8 @@ static brume_result bind_frame(struct run *run)
 static brume_result work_shadow(struct run *run)
 {
     struct renderer *renderer = run->renderer;
+    const uint64_t casters[] = {renderer->stages[BRUME_STAGE_UPLOAD].revision,
+                                renderer->emitters.signature};
     const struct render_request *request = run->request;
     job_report(request->control, BRUME_STAGE_SHADOW, 0.02f);
     TRY(shadows_layout(&renderer->shadows, request->snapshot, &renderer->world_map,
@@ -213,7 +215,7 @@ static brume_result work_shadow(struct run *run)
                        request->control));
     TRY(shadows_upload(run->gpu, &renderer->shadows));
     return shadows_render(run->gpu, &renderer->shadows, &renderer->geometry,
-                          renderer->stages[BRUME_STAGE_UPLOAD].revision, request->control,
+                          signature(casters, 2), request->control,
                           &run->request->stats.shadow_maps_drawn);
 }
 

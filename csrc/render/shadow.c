@@ -159,7 +159,8 @@ static int casts(const struct geometry *geometry)
 }
 
 brume_result shadows_plan(const struct snapshot *snapshot, const struct world_map *map,
-                          const struct emitters *emitters, const brume_settings *settings, const struct geometry *geometry,
+                          const struct emitters *emitters, const brume_settings *settings,
+                          const struct geometry *geometry,
                           uint64_t budget, struct shadow_plan *plan)
 {
     const struct lamps all = all_lamps(snapshot, map, emitters);
@@ -347,7 +348,7 @@ static brume_result draw_map(struct gpu *gpu, struct shadows *shadows, struct ge
 }
 
 brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,
-                            uint64_t geometry_revision, struct job_control *control,
+                            uint64_t casters, struct job_control *control,
                             uint32_t *drawn)
 {
     if (!shadows->framebuffer) {
@@ -363,7 +364,7 @@ brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geo
                    shadows->world_count * sizeof *shadows->samples);
     brume_result result = BRUME_OK;
     for (uint32_t i = 0; i < shadows->view_count && result == BRUME_OK; ++i) {
-        const uint64_t wanted = map_signature(shadows, i, geometry_revision);
+        const uint64_t wanted = map_signature(shadows, i, casters);
         uint64_t *holds = place_of(shadows, &shadows->views[i].tile);
         if (shadows->views[i].tile.z < 1.0f)
             shadows->world_signature =

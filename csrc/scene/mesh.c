@@ -21,7 +21,6 @@ static void mesh_destroy(struct block *block)
     free(mesh->corners);
     free(mesh->slot_first);
     free(mesh->materials);
-    free(mesh->islands);
     free(mesh);
 }
 
@@ -110,42 +109,6 @@ static void write_triangle(const brume_mesh *source, uint32_t triangle, struct m
     }
 }
 
-/* The vertex that stands for all that hangs together with another. */
-static uint32_t island_of(uint32_t *parents, uint32_t vertex)
-{
-    while (parents[vertex] != vertex) {
-        parents[vertex] = parents[parents[vertex]];
-        vertex = parents[vertex];
-    }
-    return vertex;
-}
-
-/* Of each vertex of the source the number of its island, or NULL without memory. */
-static uint32_t *number_islands(const brume_mesh *source, uint32_t *count)
-{
-    uint32_t *parents = malloc(((size_t)source->vertex_count + 1) * sizeof *parents);
-    uint32_t *numbers = malloc(((size_t)source->vertex_count + 1) * sizeof *numbers);
-    *count = 0;
-    for (uint32_t v = 0; v < source->vertex_count && parents; ++v)
-        parents[v] = v;
-    for (uint32_t t = 0; t < source->triangle_count && parents; ++t)
-        for (int corner = 1; corner < 3; ++corner) {
-            const uint32_t a = island_of(parents, place(source, t, 0));
-            const uint32_t b = island_of(parents, place(source, t, corner));
-            parents[a > b ? a : b] = a > b ? b : a; /* the least stands for all */
-        }
-    for (uint32_t v = 0; v < source->vertex_count && parents && numbers; ++v) {
-        const uint32_t first = island_of(parents, v);
-        numbers[v] = first == v ? (*count)++ : numbers[first];
-    }
-    if (!parents) {
-        free(numbers);
-        numbers = NULL;
-    }
-    free(parents);
-    return numbers;
-}
-
 /* Counting sort by slot: one draw a slot. */
 static brume_result write_triangles(const brume_mesh *source, struct mesh_block *mesh)
 {
@@ -155,20 +118,17 @@ static brume_result write_triangles(const brume_mesh *source, struct mesh_block 
         .latest = malloc(((size_t)source->vertex_count + 1) * sizeof *chains.latest),
         .before = malloc((corner_count + 1) * sizeof *chains.before)};
     uint32_t *next = calloc((size_t)slot_count + 1, sizeof *next);
-    uint32_t *islands = number_islands(source, &mesh->island_count);
     brume_result result = BRUME_OK;
-    if (chains.latest && chains.before && next && islands) {
+    if (chains.latest && chains.before && next) {
         memset(chains.latest, 0xff, source->vertex_count * sizeof *chains.latest); /* NONE */
         for (uint32_t t = 0; t < source->triangle_count; ++t)
             ++mesh->slot_first[slot_of(source, slot_count, t) + 1];
         for (uint32_t s = 0; s < slot_count; ++s)
             mesh->slot_first[s + 1] += mesh->slot_first[s];
         memcpy(next, mesh->slot_first, slot_count * sizeof *next);
-        for (uint32_t t = 0; t < source->triangle_count; ++t) {
-            const uint32_t to = next[slot_of(source, slot_count, t)]++;
-            write_triangle(source, t, mesh, &chains, mesh->corners + 3 * (size_t)to);
-            mesh->islands[to] = islands[place(source, t, 0)];
-        }
+        for (uint32_t t = 0; t < source->triangle_count; ++t)
+            write_triangle(source, t, mesh, &chains,
+                           mesh->corners + 3 * (size_t)next[slot_of(source, slot_count, t)]++);
     } else {
         result = fail(BRUME_E_MEMORY, "no memory to sort the %u triangles of mesh '%s'",
                       source->triangle_count, mesh->name);
@@ -176,7 +136,6 @@ static brume_result write_triangles(const brume_mesh *source, struct mesh_block 
     free(chains.latest);
     free(chains.before);
     free(next);
-    free(islands);
     return result;
 }
 
@@ -201,10 +160,8 @@ brume_result mesh_create(const brume_mesh *source, struct block **out)
     mesh->corners = malloc((corner_count + 1) * sizeof *mesh->corners);
     mesh->slot_first = calloc((size_t)slot_count + 1, sizeof *mesh->slot_first);
     mesh->materials = calloc(slot_count, sizeof *mesh->materials);
-    mesh->islands = malloc(((size_t)source->triangle_count + 1) * sizeof *mesh->islands);
     brume_result result = BRUME_OK;
-    if (!mesh->vertices || !mesh->corners || !mesh->slot_first || !mesh->materials ||
-        !mesh->islands)
+    if (!mesh->vertices || !mesh->corners || !mesh->slot_first || !mesh->materials)
         result = fail(BRUME_E_MEMORY, "no memory for the %u triangles of mesh '%s'",
                       source->triangle_count, name);
     else

@@ -19,8 +19,6 @@ struct mesh_block {
     uint32_t *corners;    /* 3 a triangle, sorted by slot: numbers of vertices */
     uint32_t *slot_first; /* slot_count + 1: first triangle of each slot */
     uint64_t *materials; /* slot_count */
-    uint32_t *islands;   /* of each triangle, what hangs together by its vertices: a number, */
-    uint32_t island_count; /* from 0 on */
     float lower[3], upper[3];
 };
 

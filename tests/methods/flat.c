@@ -125,6 +125,8 @@ static void endless_fog_is_in_the_lattice(void **state)
     assert_ok(brume_scene_set_world(scene, &world));
     const float length = lattice_length(scene);
     assert_true(length > 2.0f * 2.0f / 0.5f && length < 15.0f);
+    add_plate(scene, 3, (float[3]){0, 0, -0.5f}, down, 1000.0f);
+    assert_true(lattice_length(scene) < 15.0f);
     world.sigma_s[0] = world.sigma_s[1] = world.sigma_s[2] = 1e-4f; /* not so far that cells are coarse */
     assert_ok(brume_scene_set_world(scene, &world));
     assert_true(lattice_length(scene) < 25.0f);

@@ -44,8 +44,10 @@ def lens_of(ob):
         return Lens()
     data, dof = ob.data, ob.data.dof
     length = 1.0 if data.type == 'ORTHO' else data.lens * 1e-3
-    return Lens(0.5 * length / max(dof.aperture_fstop, 1e-5), max(_focus(ob), 1e-5),
-                dof.aperture_blades, dof.aperture_rotation, dof.aperture_ratio)
+    # Within what the library takes; Blender has no upper ends.
+    return Lens(min(0.5 * length / max(dof.aperture_fstop, 1e-5), 1e6),
+                min(max(_focus(ob), 1e-5), 1e30), dof.aperture_blades, dof.aperture_rotation,
+                min(max(dof.aperture_ratio, 0.01), 100.0))
 
 
 def border_pixels(render, width, height):

@@ -305,7 +305,7 @@ static bool add_instance(struct search *search, const struct mesh_block *mesh,
         const struct part *part = &parts[i];
         bool inner = !(part->area > 0.0); /* nothing of it is seen */
         for (uint32_t k = 0; k < count; ++k)
-            inner = inner || is_within(part, &parts[k]);
+            inner = inner || (is_ball_like(&parts[k]) && is_within(part, &parts[k]));
         if (inner)
             continue;
         if (!(longest_side(part) <= search->longest && fabs(part->lower[0]) < (double)FARTHEST &&

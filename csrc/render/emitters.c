@@ -16,8 +16,8 @@
 #define MOST_TRIANGLES (1u << 18)
 #define FARTHEST 1e15f  /* m, as for geometry */
 #define BRIGHTEST 1e30f /* W */
-/* Cells that one may be long. Boxes of 0.35 are up to 91 % off in the lattice, of 0.75 up to 32 %
- * (tests/methods/dom_glow), and shine in beams along its directions. */
+/* Cells that one may be long. In the lattice boxes of 0.35 were up to 91 % off, of 0.75 up to 32 %,
+ * and shone in beams along its directions; larger ones: tests/methods/dom_glow. */
 #define LONGEST 1.0
 /* Of the normals' squares along one axis: above it all of a part is about across that. Of a ball a
  * third, of a cube as well. */

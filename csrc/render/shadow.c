@@ -160,8 +160,8 @@ static int casts(const struct geometry *geometry)
 
 brume_result shadows_plan(const struct snapshot *snapshot, const struct world_map *map,
                           const struct emitters *emitters, const brume_settings *settings,
-                          const struct geometry *geometry,
-                          uint64_t budget, struct shadow_plan *plan)
+                          const struct geometry *geometry, uint64_t budget,
+                          struct shadow_plan *plan)
 {
     const struct lamps all = all_lamps(snapshot, map, emitters);
     *plan = (struct shadow_plan){
@@ -348,8 +348,7 @@ static brume_result draw_map(struct gpu *gpu, struct shadows *shadows, struct ge
 }
 
 brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,
-                            uint64_t casters, struct job_control *control,
-                            uint32_t *drawn)
+                            uint64_t casters, struct job_control *control, uint32_t *drawn)
 {
     if (!shadows->framebuffer) {
         glCreateFramebuffers(1, &shadows->framebuffer);

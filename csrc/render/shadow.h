@@ -36,8 +36,8 @@ struct shadow_plan {
 /* budget: bytes that the maps may take. Arithmetic alone. */
 brume_result shadows_plan(const struct snapshot *snapshot, const struct world_map *map,
                           const struct emitters *emitters, const brume_settings *settings,
-                          const struct geometry *geometry,
-                          uint64_t budget, struct shadow_plan *plan);
+                          const struct geometry *geometry, uint64_t budget,
+                          struct shadow_plan *plan);
 /* Lights, samples and shadow views from the snapshot, for casters within the geometry's bounds;
  * warns where the plan falls short of the settings. */
 brume_result shadows_layout(struct shadows *shadows, const struct snapshot *snapshot,
@@ -49,8 +49,7 @@ brume_result shadows_upload(struct gpu *gpu, struct shadows *shadows);
 /* Draws the maps that differ from what their places hold, and adds to their count.
  * casters: a signature that tells them apart. */
 brume_result shadows_render(struct gpu *gpu, struct shadows *shadows, struct geometry *geometry,
-                            uint64_t casters, struct job_control *control,
-                            uint32_t *drawn);
+                            uint64_t casters, struct job_control *control, uint32_t *drawn);
 void shadows_bind(const struct shadows *shadows);
 void shadows_finish(struct gpu *gpu, struct shadows *shadows);
 

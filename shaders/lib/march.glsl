@@ -216,13 +216,12 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, b
     vec3 sharp_through = exp(-sharp_t * dt);
 #endif
     float falloff = 1.0, uneven = 0.0;
-    vec3 weight = vec3(0.0);
+    vec3 weight;
     if (!lamp.sun)
         falloff = mean_inverse_square(t0 - lamp.along, dt, lamp.h, within, uneven);
     else
         see_into(m.sigma_t, through, dt, within, weight);
     vec3 p = ray.origin + ray.direction * (t0 + within * dt);
-    vec3 there = through;
 #ifdef DOM
     vec3 sharp_there = sharp_through;
 #endif
@@ -231,7 +230,8 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, b
         look_up_scatter(p, in_lattice, m);
     if (!lamp.sun) {
         m.sigma_t = look_up_extinct(p, in_lattice);
-        there = exp(-m.sigma_t * dt);
+        vec3 there = exp(-m.sigma_t * dt);
+        weight = step_weight_at(m.sigma_t, there, dt, within, uneven);
 #ifdef DOM
         sharp_t = m.sigma_t + forward_share(m.g) * m.sigma_s;
         sharp_there = exp(-sharp_t * dt);
@@ -256,12 +256,8 @@ vec3 lamp_step(lamp_ray lamp, view_ray ray, medium_step m, bool scatter_known, b
         // In the peak the step is denser than in what its place was chosen by, and its weight the lesser.
         vec3 sharp = lamp.sun ? weight * exp((m.sigma_t - sharp_t) * (within * dt))
                               : step_weight_at(sharp_t, sharp_there, dt, within, uneven);
-        if (!lamp.sun)
-            weight = step_weight_at(m.sigma_t, there, dt, within, uneven);
         sum = here * (reach.soft * weight * soft + reach.sharp * sharp * peak);
 #else
-        if (!lamp.sun)
-            weight = step_weight_at(m.sigma_t, there, dt, within, uneven);
         sum = here * reach.soft * weight * phase_hg(cosine, m.g);
 #endif
     }

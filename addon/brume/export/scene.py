@@ -195,12 +195,11 @@ class _Export:
         slots = [self.slot(m) for m in self.materials(ob, own)]
         shape, reads = self.shape(instance, ob, own, slots)
         if shape.mesh is not None:
+            self.surface_visibility(ob)
             for slot in slots:
                 if slot not in self.drawn:
                     self.drawn.add(slot)
                     material.export(self.target, slot.material)
-        if shape.mesh is not None:
-            self.surface_visibility(ob)
         thing = _Thing(mesh=shape.mesh, visibility=self.visibility(ob))
         if shape.medium is not None:
             medium = slots[shape.medium]
